@@ -119,7 +119,7 @@ class ExactRates:
     def __init__(self, exact: ExactProblem, kind: int, ends: tuple[Any, Any]) -> None:
         self.scale, self.kind, self.ends = exact.at(DIGITS), kind, ends
         self.context, self.places = self.scale.context, (float(ends[0]), float(ends[1]))
-        self.joints = self.scale.phase_angles(kind, *ends, self.scale.track.joints(*ends) or ())
+        self.joints: Sequence[Any] = self.scale.phase_angles(kind, *ends, self.scale.track.joints(*ends) or ())
         self.launch, self.tape = (exact.lam0, exact.v0), exact.tape()
         self.segment = two_doubles(ends[0]), two_doubles(ends[1] - ends[0])
         self.slow = None if self.tape is None or len(self.joints) else SlowRates(self.scale, kind, ends)
@@ -157,7 +157,12 @@ class _RatesAlongChart:
     """The integrands along a charted curve in double-double arithmetic, or by mpmath where that does not suffice."""
 
     def __init__(
-        self, exact: ExactProblem, kind: int, known: tuple[tuple[float, float], tuple[Any, Any]], along: Any, joints: Any
+        self,
+        exact: ExactProblem,
+        kind: int,
+        known: tuple[tuple[float, float], tuple[Any, Any]],
+        along: Any,
+        joints: Any,
     ) -> None:
         self.kind, self.context, self.places, self.joints = kind, _mpmath_context(), along.ends, joints
         self._exact, self._known, self._along = exact, known, along

@@ -3,7 +3,8 @@
 They are those of `double_double.panel_rates`, for a segment between two places of a chart.
 """
 
-from math import fabs, nan, sqrt
+from math import fabs, nan
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -25,7 +26,16 @@ from gqm_sym.runtime.charts.double_double.pieces import (
     unshared,
 )
 from gqm_sym.runtime.charts.double_double.potential import Path, fill_registers
-from gqm_sym.runtime.charts.double_double.turning_points import LAUNCH, LEVEL, LOWER, UPPER, arc_from, find_turn
+from gqm_sym.runtime.charts.double_double.turning_points import (
+    COLUMNS,
+    LAUNCH,
+    LEVEL,
+    LOWER,
+    ROWS,
+    UPPER,
+    arc_from,
+    find_turn,
+)
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
@@ -40,63 +50,59 @@ from gqm_sym.runtime.double_double.recording import BoundTape
 # Neither of the last three need be a double.
 PLACE, TURNING_POINT, LAUNCH_PLACE, CURVE_BEGIN, CURVE_END = 0.0, 1.0, 2.0, 3.0, 4.0
 
-# Rows of the array that `find_ends` fills, two doubles each: the arc length from the left edge of the piece on which
-# the segment begins to its beginning; its width, which is negative for a motion backwards; and the arc lengths from the
-# left edge of the starting piece to both of its ends.
-BASE, WIDTH, FIRST, LAST = range(4)
+# Further rows of the array that `locate` fills, two doubles each: the arc length from the left edge of the piece on
+# which the segment begins to its beginning; its width, which is negative for a motion backwards; and the arc lengths
+# from the left edge of the starting piece to both of its ends.
+BASE, WIDTH, FIRST, LAST = range(ROWS, ROWS + 4)
 
 
 @entry(
-    types.void(
-        TRUE_CURVE, TAPE, VECTOR, MATRIX, types.UniTuple(PAIR, 2), types.UniTuple(REAL, 2), INTEGER, MATRIX, MATRIX
-    ),
+    types.void(TRUE_CURVE, TAPE, VECTOR, MATRIX, types.UniTuple(types.UniTuple(REAL, 3), 2), INTEGER, MATRIX),
     checked=False,
 )
-def find_ends(curve, tape, work, p, ends, whats, start, found, spans):  # type: ignore[no-untyped-def]
+def find_ends(curve, tape, work, p, ends, start, found):  # type: ignore[no-untyped-def]
     """Find the ends of a segment; they are NaN if a turning point is not found.
 
     Parameters
     ----------
     curve, tape, work, p, start
         As for `turning_points.locate`.
-    ends : two pairs of float
-        The arc lengths of both ends from the left edge of the piece ``start``; those of turning points are guesses.
-    whats : two floats
-        What they are, from PLACE to CURVE_END.
-    found : (ROWS, COLUMNS) array
+    ends : two tuples of float
+        For each end the arc length from the left edge of the piece ``start``, two doubles, and what the end is, from
+        PLACE to CURVE_END. The arc length of a turning point is a guess.
+    found : (LAST + 1, COLUMNS) array
         The launch and the energy level, from `locate`. The ends are filled in the rows LOWER, which is that of the
-        beginning, and UPPER.
-    spans : (4, 2) array
-        Filled.
+        beginning, and UPPER; and the rows from BASE to LAST are filled.
     """
-    curve, work, found, spans = unshared(curve), borrowed(work), borrowed(found), borrowed(spans)
+    curve, work, found = unshared(curve), borrowed(work), borrowed(found)
     address, operations, parts, registers = tape
     tape = (address, borrowed(operations), parts, registers)
     fill_parameters(tape, borrowed(p), work)
     path = Path(curve, tape, work, (found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3]))
     for i, row in ((0, LOWER), (1, UPPER)):
         number, place = int(found[LAUNCH, 0]), (found[LAUNCH, 1], found[LAUNCH, 2])
-        if whats[i] == CURVE_BEGIN:
+        arc, arc_low, what = ends[i]
+        if what == CURVE_BEGIN:
             number, place = 0, (-1.0, 0.0)
-        elif whats[i] == CURVE_END:
+        elif what == CURVE_END:
             number, place = curve.counts.shape[0] - 1, (1.0, 0.0)
-        elif whats[i] != LAUNCH_PLACE:
-            number, place = place_at(curve, start, ends[i])
-        if whats[i] == TURNING_POINT:
-            inward = 1 if ends[1 - i][0] > ends[i][0] else -1
+        elif what != LAUNCH_PLACE:
+            number, place = place_at(curve, start, (arc, arc_low))
+        if what == TURNING_POINT:
+            inward = 1 if ends[1 - i][0] > arc else -1
             turn, _, _ = find_turn(path, number, place, inward)
             number, place = turn[0], (turn[1], turn[2])
         found[row, 0], found[row, 1], found[row, 2] = number, place[0], place[1]
-        spans[FIRST + i, 0], spans[FIRST + i, 1] = arc_from(curve, start, number, place)
+        found[FIRST + i, 0], found[FIRST + i, 1] = arc_from(curve, start, number, place)
     first, last = int(found[LOWER, 0]), int(found[UPPER, 0])
     a, b = (found[LOWER, 1], found[LOWER, 2]), (found[UPPER, 1], found[UPPER, 2])
-    (spans[BASE, 0], spans[BASE, 1]), _ = arc_on(curve, first, (-1.0, 0.0), a)
+    (found[BASE, 0], found[BASE, 1]), _ = arc_on(curve, first, (-1.0, 0.0), a)
     if last > first or (last == first and b[0] >= a[0]):
         width, _ = arc_between(curve, first, a, last, b)
     else:
         back, _ = arc_between(curve, last, b, first, a)
         width = -back[0], -back[1]
-    spans[WIDTH, 0], spans[WIDTH, 1] = width
+    found[WIDTH, 0], found[WIDTH, 1] = width
 
 
 @Inner
@@ -125,35 +131,39 @@ def rate_at(path, number, place):  # type: ignore[no-untyped-def]
 
 
 @entry(
-    types.boolean(
-        TRUE_CURVE, TAPE, VECTOR, MATRIX, MATRIX, MATRIX, INTEGER, types.UniTuple(PAIR, 2), VECTOR, MATRIX
-    ),
+    types.boolean(TRUE_CURVE, TAPE, VECTOR, MATRIX, MATRIX, types.Tuple((INTEGER, PAIR, PAIR)), VECTOR, MATRIX),
     checked=False,
 )
-def fill_rates(curve, tape, work, p, found, spans, kind, panel, nodes, out):  # type: ignore[no-untyped-def]
+def fill_rates(curve, tape, work, p, found, panel, nodes, out):  # type: ignore[no-untyped-def]
     """Fill the rows of ``out`` with dt/dphi, ds/dphi and the regular factor of the speed at the nodes of a panel.
 
     Parameters
     ----------
-    curve, tape, work, p, found, spans
+    curve, tape, work, p, found
         As for `find_ends`.
-    kind, panel, nodes
-        As for `double_double.panel_rates.fill_rates`, without the first two pairs.
+    panel : (kind, middle, reach)
+        The segment's kind (`quadrature.substitution`), the phase angle in the middle of the panel, and the angle from
+        there to its end, two doubles each.
+    nodes : (n,) array
+        Nodes between -1 and 1.
+    out : (3, n) array
+        Filled.
 
     Returns
     -------
     bool
         Whether the errors are small enough at all nodes, and V**2 is positive there.
     """
-    curve, work, found, spans = unshared(curve), borrowed(work), borrowed(found), borrowed(spans)
+    curve, work, found = unshared(curve), borrowed(work), borrowed(found)
     nodes, out = borrowed(nodes), borrowed(out)
     address, operations, parts, registers = tape
     tape = (address, borrowed(operations), parts, registers)
     fill_parameters(tape, borrowed(p), work)
     path = Path(curve, tape, work, (found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3]))
-    first, base, width = int(found[LOWER, 0]), (spans[BASE, 0], spans[BASE, 1]), (spans[WIDTH, 0], spans[WIDTH, 1])
+    first, base, width = int(found[LOWER, 0]), (found[BASE, 0], found[BASE, 1]), (found[WIDTH, 0], found[WIDTH, 1])
     n, rows = nodes.size, np.empty((4, nodes.size))
-    fill_shares(kind, panel[0], panel[1], nodes, rows)
+    kind, middle, reach = panel
+    fill_shares(kind, middle, reach, nodes, rows)
     for i in range(n):
         ahead, ahead_low = multiply(rows[0, i], rows[1, i], width[0], width[1])
         number, place = place_at(curve, first, add(base[0], base[1], ahead, ahead_low))
@@ -207,15 +217,19 @@ class ChartRates:
         whats: tuple[float, float],
         offset: Pair = ZERO,
     ) -> None:
-        self._kind, self._spans, self.is_known = kind, np.full((4, 2), nan), False
+        self._kind, self.is_known = kind, False
         given = begin_orbit(pieces, formulas, launch, ends, 1, offset)
         if given is None:
             return
-        arcs = plus(pieces.start_length, (ends[0], 0.0)), plus(pieces.start_length, (ends[1], 0.0))
-        find_ends(*given[:-1], arcs, whats, pieces.begin, given[-1], self._spans)
-        self._given, self.is_known = (*given, self._spans), bool(np.isfinite(self._spans).all())
-        found = [minus(self._spans[row].tolist(), pieces.start_length)[0] for row in (FIRST, LAST)]
-        self.ends = tuple(at if what == TURNING_POINT else end for end, what, at in zip(ends, whats, found, strict=True))
+        found = np.full((LAST + 1, COLUMNS), nan)
+        found[:ROWS] = given[-1]
+        self._given: Any = *given[:-1], found
+        a, b = ((*plus(pieces.start_length, (end, 0.0)), what) for end, what in zip(ends, whats, strict=True))
+        find_ends(*given[:-1], (a, b), pieces.begin, found)
+        self.is_known = bool(np.isfinite(found[BASE:, :2]).all())
+        places = [minus(found[row, :2].tolist(), pieces.start_length)[0] for row in (FIRST, LAST)]
+        turns = [what == TURNING_POINT for what in whats]
+        self.ends = places[0] if turns[0] else ends[0], places[1] if turns[1] else ends[1]
 
     def __call__(self, middle: Pair, reach: Pair, nodes: Array) -> Array | None:
         """Return dt/dphi in s, ds/dphi in m and the regular factor of the speed in m/s at the nodes of a panel; None
@@ -229,4 +243,4 @@ class ChartRates:
             Nodes between -1 and 1.
         """
         out = np.empty((3, nodes.size))
-        return out if fill_rates(*self._given, self._kind, (middle, reach), nodes, out) else None
+        return out if fill_rates(*self._given, (self._kind, middle, reach), nodes, out) else None

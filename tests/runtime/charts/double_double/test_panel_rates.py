@@ -1,9 +1,9 @@
-"""Times along charts next to a hilltop come from double-double arithmetic, and agree with closed forms and with extended
-precision.
+"""Times along charts beside a hilltop are from double-double arithmetic, and agree with quadrature by mpmath and with
+extended precision.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -52,14 +52,13 @@ def attracted(build: Build) -> ModuleType:
 
 
 @pytest.fixture
-def no_mpmath(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def no_mpmath(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make it an error to ask for ends in extended precision."""
 
     def refuse(*_: Any) -> None:
         raise AssertionError("the ends are asked for in extended precision")
 
     monkeypatch.setattr(exact_panels, "exact_ends", refuse)
-    yield
 
 
 class Rail:
@@ -68,7 +67,7 @@ class Rail:
     def __init__(self) -> None:
         heading, x, z, self.edges, self.parts = -mp.pi / 2, mpf(-5), mpf(4), [mpf(0)], []
         for r, size in PIECES:
-            radius, angle = mpf(r), {"pi/4": mp.pi / 4, "pi/2": mp.pi / 2}.get(size, None)
+            radius, angle = mpf(r), {"pi/4": mp.pi / 4, "pi/2": mp.pi / 2}.get(size)
             length = mpf(size) if angle is None else radius * angle
             self.parts.append((x, z, heading, radius))
             x, z, heading = self._along(self.parts[-1], length)
@@ -102,6 +101,7 @@ class Rail:
         return mp.quad(rate, sorted([mpf(0), *inner, *joints, *outer, mpf(1)]))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.usefixtures("no_mpmath")
 @pytest.mark.parametrize("lam0", LAUNCHES)
 def test_time_to_the_end_of_a_rail(lam0: float, attracted: ModuleType) -> None:
@@ -132,7 +132,7 @@ def humps() -> gqm.Curve:
     return gqm.Curve.piecewise([line(length=2), *arcs, line(length=3)], start=(0, 0), heading="-pi/4")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("curve", "force", "values", "top"),
     [
@@ -163,7 +163,7 @@ def test_states_agree_with_extended_precision(
             if motion.condition_number < 64:
                 continue
             until = motion.t_end if math.isfinite(motion.t_end) else 3 * motion.period
-            times = np.linspace(0, 0.999 * until, 7)
+            times = np.linspace(0, 0.87 * until, 9)
             state = motion.state(times)
             with monkeypatch.context() as patch:
                 patch.setattr(timing, "passage_of", lambda *_: None)
@@ -172,7 +172,7 @@ def test_states_agree_with_extended_precision(
                 truth = exact.state(times)
             size = np.ptp(truth.lam)
             assert np.abs(state.lam - truth.lam).max() <= 2e-15 * (size + abs(top))
-            assert np.abs(state.v - truth.v).max() <= 8e-15 * truth.v.max()
+            assert np.abs(state.v - truth.v).max() <= 2e-15 * np.abs(truth.v).max()
             compared += 1
     assert compared >= 1
 
