@@ -104,3 +104,30 @@ def legendre_growth(c, x_from_start):  # type: ignore[no-untyped-def]
         total = fma(c[k], here, total)
         before, here, sign = here, GROWTH[k] * fma(x, here, sign) - DECAY[k - 1] * before, -sign
     return x_from_start * total
+
+
+@Inner
+def growth_beside_rest(c, distance, heading):  # type: ignore[no-untyped-def]
+    """Return by how much the Legendre series with coefficients c differs from its value at an end of the range at which
+    its slope vanishes, given the distance from there.
+
+    Its relative error stays small for small distances y, because each polynomial is divided by y twice: at -1,
+    P_k - P_k(-1) = y P_k'(-1) + y**2 R_k, the sum of the first terms is zero but for roundings, and
+    (k+1) R_(k+1) = (2k+1) (P_k'(-1) + (y-1) R_k) - k R_(k-1).
+
+    Parameters
+    ----------
+    c : array
+        The coefficients.
+    distance : float
+        The distance from the end, much smaller than 1.
+    heading : float
+        1 for the end at -1, and -1 for that at 1.
+    """
+    before, here, sign, total, x = 0.0, 0.0, heading, 0.0, distance - 1.0
+    for k in range(1, c.size):
+        total = fma(sign * c[k], here, total)
+        slope = 0.5 * k * (k + 1) if k % 2 else -0.5 * k * (k + 1)
+        before, here = here, GROWTH[k] * fma(x, here, slope) - DECAY[k - 1] * before
+        sign *= heading
+    return distance * distance * total

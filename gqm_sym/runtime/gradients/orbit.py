@@ -148,6 +148,7 @@ class OrbitDerivatives(ABC):
         """The derivatives of the half period of a libration, or of the time of a lap."""
         return self._integrals(1, self.source.variables)
 
+    @abstractmethod
     def second_durations(self, rows: tuple[int, ...]) -> Array:
         """Return the second derivatives of the half period of a libration, or of the time of a lap.
 
@@ -156,7 +157,6 @@ class OrbitDerivatives(ABC):
         rows : tuple of int
             The variables; there is a derivative for each of their pairs, in the order of `second_programs.pairs_of`.
         """
-        raise SolutionError("gradient: there are no second derivatives along curves without formulas yet")
 
     @property
     def action(self) -> float:

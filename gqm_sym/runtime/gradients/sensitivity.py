@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
@@ -22,7 +23,7 @@ from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
 from gqm_sym.runtime.gradients.path import DS, POTENTIAL, PathRows, fill_changed, path_changes
 from gqm_sym.runtime.gradients.series import PanelSeries, Series, add_series, fill_waves
-from gqm_sym.runtime.inversion.records import find_phases
+from gqm_sym.runtime.inversion.records import FUNCTIONS, find_phases, section
 
 # The rows of launch place and speed among the variables (`programs.Source`).
 LAM0, V0 = -3, -2
@@ -71,6 +72,30 @@ class Sensitivity(NamedTuple):
 
 
 @Inner
+def fill_shares(points, scale, share, upper):  # type: ignore[no-untyped-def]
+    """Fill the shares of the phase at points, and those by which places move with the upper turning point."""
+    for i in range(share.size):
+        share[i] = points[PHASE, i] / scale
+        upper[i] = sin(pi * share[i]) ** 2
+
+
+@Inner
+def fill_at_phase(orbit, j, share, upper, place):  # type: ignore[no-untyped-def]
+    """Fill the changes with the j-th variable of places within the lap, at fixed phase angles."""
+    lap, lower, high = orbit[LAP, j], orbit[LOWER, j], orbit[UPPER, j]
+    for i in range(share.size):
+        place[i] = lap * share[i] + lower * (1.0 - upper[i]) + high * upper[i]
+
+
+@Inner
+def fill_delays(points, orbit, j, later, scale, delay):  # type: ignore[no-untyped-def]
+    """Fill the delays with the j-th variable, given the changes of the time along the orbit."""
+    launch, duration, turns, sense = orbit[LAUNCH_DELAY, j], orbit[DURATION, j], points[TURNS], points[SENSE]
+    for i in range(delay.size):
+        delay[i] = launch - turns[i] * duration - sense[i] * scale * later[i]
+
+
+@Inner
 def find_changes(points, orbit, series, path, scale, found):  # type: ignore[no-untyped-def]
     """Fill the changes of states at fixed times.
 
@@ -90,28 +115,25 @@ def find_changes(points, orbit, series, path, scale, found):  # type: ignore[no-
         The changes of lam within the lap, s, x, z, v, N and y, which are filled.
     """
     variables, n, swings = orbit.shape[1], points.shape[1], scale != 1.0
-    share, upper, acceleration = np.empty(n), np.empty(n), np.empty(n)
-    ds, fall, v, sense = path[DS, 0], path[POTENTIAL, path.shape[1] - 1], points[SPEED], points[SENSE]
-    turns, laps, rate = points[TURNS], points[LAPS], series[0, 0]
+    share, upper, acceleration, delay = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    ds, fall, v = path[DS, 0], path[POTENTIAL, path.shape[1] - 1], points[SPEED]
+    laps, rate = points[LAPS], series[0, 0]
+    fill_shares(points, scale, share, upper)
     for i in range(n):
-        share[i] = points[PHASE, i] / scale
-        upper[i], acceleration[i] = sin(pi * share[i]) ** 2, -fall[i] / ds[i]
+        acceleration[i] = -fall[i] / ds[i]
     for j in range(variables):
-        lap, lower, high = orbit[LAP, j], orbit[LOWER, j], orbit[UPPER, j]
-        launch, duration, widening = orbit[LAUNCH_DELAY, j], orbit[DURATION, j], orbit[WIDENING, j]
-        launch_arc, lap_arc = orbit[LAUNCH_ARC, j], orbit[LAP_ARC, j]
+        widening, launch_arc, lap_arc = orbit[WIDENING, j], orbit[LAUNCH_ARC, j], orbit[LAP_ARC, j]
         place, arc, faster = found[LAM, j], found[S, j], found[V, j]
-        slower, later, longer = series[0, 1 + j], series[1, 1 + j], series[1, 1 + variables + j]
-        for i in range(n):
-            place[i] = lap * share[i] + lower * (1.0 - upper[i]) + high * upper[i]
+        slower, longer = series[0, 1 + j], series[1, 1 + variables + j]
+        fill_at_phase(orbit, j, share, upper, place)
         fill_changed(path[DS], j, place, faster)
+        fill_delays(points, orbit, j, series[1, 1 + j], scale, delay)
         for i in range(n):
-            delay = launch - turns[i] * duration - sense[i] * scale * later[i]
-            faster[i] = v[i] * (widening + faster[i] / ds[i] - slower[i] / rate[i]) + acceleration[i] * delay
-            arc[i] = launch_arc + laps[i] * lap_arc + scale * longer[i] + v[i] * delay
+            faster[i] = v[i] * (widening + faster[i] / ds[i] - slower[i] / rate[i]) + acceleration[i] * delay[i]
+            arc[i] = launch_arc + laps[i] * lap_arc + scale * longer[i] + v[i] * delay[i]
             if swings:
                 arc[i] += ds[i] * place[i]
-            place[i] += v[i] / ds[i] * delay
+            place[i] += v[i] / ds[i] * delay[i]
     path_changes(path, points[SPEED], found[LAM], found[X:STATE_ROWS])
 
 
@@ -180,6 +202,39 @@ def fill_sensitivities(motion, along, orbit, found):  # type: ignore[no-untyped-
         found[:, :, start : start + n] = changes
 
 
+@entry(types.void(types.UniTuple(VECTOR, 3), types.Tuple((MATRIX, CUBE, REAL)), MATRIX), checked=False, nogil=True)
+def fill_place_changes(motion, orbit, found):  # type: ignore[no-untyped-def]
+    """Fill the changes of the places alone, with a row for each variable.
+
+    The arguments are those of `fill_sensitivities`, but the series are those of the changes of the time along the orbit
+    alone.
+    """
+    (record, p, t), (constants, table, scale) = motion, orbit
+    address, (functions, terms) = section(record, FUNCTIONS).view(np.int64)[0], table.shape[1:]
+    size = min(LANES, t.size)
+    space, rest = np.empty((POINT_ROWS + terms + 2 * functions) * size), np.empty((5 + 4) * size)
+    for start in range(0, t.size, LANES):
+        n = min(LANES, t.size - start)
+        ends = POINT_ROWS * n, (POINT_ROWS + terms) * n, (POINT_ROWS + terms + 2 * functions) * n
+        points, waves = space[: ends[0]].reshape(POINT_ROWS, n), space[ends[0] : ends[1]].reshape(terms, n)
+        series, path = space[ends[1] : ends[2]].reshape(2, functions, n), rest[: 5 * n].reshape(5, n)
+        share, upper, delay, v2 = rest[5 * n : 6 * n], rest[6 * n : 7 * n], rest[7 * n : 8 * n], rest[8 * n : 9 * n]
+        find_phases(record, p, t[start : start + n], points)
+        v, laps = points[SPEED], points[LAPS]
+        for i in range(n):
+            v2[i] = v[i] * v[i]
+        call_path_and_contact_force(address, n, points[PLACE], v2, p, path)
+        fill_shares(points, scale, share, upper)
+        fill_waves(share, waves)
+        add_series(table, waves, series)
+        for j in range(functions):
+            place, lap = found[j, start : start + n], constants[LAP, j]
+            fill_at_phase(constants, j, share, upper, place)
+            fill_delays(points, constants, j, series[1, j], scale, delay)
+            for i in range(n):
+                place[i] += v[i] / path[2, i] * delay[i] + laps[i] * lap
+
+
 def points_of(found: Any, lam: Array, v: Array) -> Array:
     """Return points on an orbit in the form that `fill_changes` takes.
 
@@ -219,7 +274,7 @@ class OrbitSensitivity:
         self._series, self._lap = derivatives.series
         self._from_launch: tuple[float, PanelSeries] | None = None
         self._orbits: dict[float, Array] = {}
-        self._chosen: dict[tuple[float, tuple[int, ...]], tuple[Any, Any]] = {}
+        self._chosen: dict[tuple[float, tuple[int, ...], bool], tuple[Any, Any]] = {}
 
     def _orbit(self, motion: Any, phi: float) -> Array:
         """Return the constants of the orbit; the launch's phase angle gains digits once the period is known exactly."""
@@ -287,10 +342,7 @@ class OrbitSensitivity:
 
     def at_times(self, motion: Any, record: Array, t: Array, phi: float, rows: tuple[int, ...]) -> Array:
         """Return what `at` does, for times in a record of a motion along a curve with formulas."""
-        chosen = self._chosen.get((phi, rows))
-        if chosen is None:
-            chosen = self._chosen[phi, rows] = self._choose(motion, phi, rows)
-        along, orbit = chosen
+        along, orbit = self._chosen_for(motion, phi, rows, whole=True)
         found, p = np.empty((STATE_ROWS, len(rows), t.size)), motion.problem.functions.p
         if t.size < 2 * MIN_TIMES_PER_THREAD:
             fill_sensitivities((record, p, t), along, orbit, found)
@@ -305,11 +357,40 @@ class OrbitSensitivity:
         run_in_threads(work, t.size, MIN_TIMES_PER_THREAD)
         return found
 
-    def _choose(self, motion: Any, phi: float, rows: tuple[int, ...]) -> tuple[Any, Any]:
-        """Return the arguments of `fill_sensitivities` for some of the variables."""
-        derivatives, series = self._derivatives, self._series
+    def places_at_times(self, motion: Any, record: Array, t: Array, phi: float, rows: tuple[int, ...]) -> Array:
+        """Return the row lam of `at_times`."""
+        _, orbit = self._chosen_for(motion, phi, rows, whole=False)
+        found, p = np.empty((len(rows), t.size)), motion.problem.functions.p
+
+        def work(part: slice) -> None:
+            out = np.empty((len(rows), part.stop - part.start))
+            fill_place_changes((record, p, t[part]), orbit, out)
+            found[:, part] = out
+
+        run_in_threads(work, t.size, MIN_TIMES_PER_THREAD)
+        return found
+
+    def _chosen_for(self, motion: Any, phi: float, rows: tuple[int, ...], *, whole: bool) -> tuple[Any, Any]:
+        """Return the arguments of `fill_sensitivities` for some of the variables; unless ``whole``, None and those of
+        `fill_place_changes`.
+        """
+        chosen = self._chosen.get((phi, rows, whole))
+        if chosen is None:
+            constants, series = np.ascontiguousarray(self._orbit(motion, phi)[:, list(rows)]), self._series
+            assert isinstance(series, Series)
+            if whole:
+                chosen = self._choose(series, constants, rows)
+            else:
+                table = series.of([1 + row for row in rows])
+                table[0] = 0.0
+                chosen = None, (constants, table, self._scale)
+            self._chosen[phi, rows, whole] = chosen
+        return chosen
+
+    def _choose(self, series: Series, constants: Array, rows: tuple[int, ...]) -> tuple[Any, Any]:
+        """Return the arguments of `fill_sensitivities`, given the constants for some of the variables."""
+        derivatives = self._derivatives
         assert isinstance(derivatives, FormulaOrbitDerivatives)
-        assert isinstance(series, Series)
         variables, count, program = (
             derivatives.source.variables,
             derivatives.source.parameters,
@@ -322,7 +403,6 @@ class OrbitSensitivity:
             if row < count:
                 outputs[:, 1 + j] = of_path[:, 1 + row]
         functions = [0, *(1 + row for row in rows), *(1 + variables + row for row in rows)]
-        constants = np.ascontiguousarray(self._orbit(motion, phi)[:, list(rows)])
         along, table = (program.operands, program.work.copy(), derivatives.parameters, outputs), series.of(functions)
         table[0, 1 + len(rows) :], table[1, 0] = 0.0, 0.0  # these are not needed
         return along, (constants, table, self._scale)
@@ -379,15 +459,4 @@ class OrbitSensitivity:
             found[LAM] = found[S]
         elif self._derivatives.direction:
             found[LAM] += points[LAPS] * self._lap[:, None]
-        return found
-
-    def places_at(self, motion: Any, points: Array, phi: float, ds: Array) -> Array:
-        """Return the derivatives of lam alone, with respect to all variables, given ds/dlam."""
-        orbit = self._orbit(motion, phi)[:, :, None]
-        series, points = self._along(motion, points, phi)
-        share, times = points[PHASE] / self._scale, self._scale * series[1, 1 : 1 + orbit.shape[1]]
-        delay = orbit[LAUNCH_DELAY] - points[TURNS] * orbit[DURATION] - points[SENSE] * times
-        upper = np.sin(np.pi * share) ** 2
-        places = orbit[LAP] * (share + points[LAPS]) + orbit[LOWER] * (1.0 - upper) + orbit[UPPER] * upper
-        found: Array = places + points[SPEED] / ds * delay
         return found

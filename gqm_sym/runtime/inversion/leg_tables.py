@@ -20,7 +20,7 @@ PANELS              a row for each panel: edge, half width, arc length there, an
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.clenshaw import legendre_growth, legendre_sum
+from gqm_sym.runtime.arithmetic.clenshaw import growth_beside_rest, legendre_growth, legendre_sum
 from gqm_sym.runtime.arithmetic.elementary import cos, exp, sin
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, item_at
@@ -28,6 +28,7 @@ from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.inversion.records import error_of_place, section
 from gqm_sym.runtime.inversion.table import LAST, TERMS
+from gqm_sym.runtime.quadrature.lengths import BESIDE_EDGE
 from gqm_sym.runtime.quadrature.substitution import TO_EQUILIBRIUM, TURN_TURN
 
 FUNCTION, LAUNCH, SLOTS, INTERVALS, STATES, PANELS = range(6)
@@ -157,7 +158,11 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             launched, at = time == 0.0, interval_at(intervals, slots, rate, time)
             phi, of = phase_angle_at(intervals, at, time), at // INTERVAL_COLUMNS * STATE_COLUMNS
             panel, x, speed = speed_at(states, panels, item_at(intervals, at + KIND), of, phi)
-            arc = panels[panel + ARC] + legendre_growth(panels[panel + SERIES : panel + SERIES + WIDE], x)
+            arc, terms = panels[panel + ARC], panels[panel + SERIES : panel + SERIES + WIDE]
+            if x < BESIDE_EDGE and panels[panel + EDGE] == 0.0 and states[of + FIRST_GROWTH] == 0.0:
+                arc += growth_beside_rest(terms, x, 1.0)
+            else:
+                arc += legendre_growth(terms, x)
             place = choose(launched, launch[0], place_at(intervals, at, phi))
             v = choose(launched, launch[1], states[of + HEADING] * speed)
             lam = choose(launched, place, place + item_at(intervals, at + LAPS))

@@ -40,10 +40,11 @@ from gqm_sym.runtime.compiled.streaming import put
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.inversion.fourier import sum_wave
-from gqm_sym.runtime.inversion.table import BESIDE_END, TERMS, Table, factor_beside_end, look_up
+from gqm_sym.runtime.inversion.table import BESIDE_END, TERMS, Table, angle_to_end, look_up
 from gqm_sym.runtime.quadrature.integrands import Integrand, fill_speeds
+from gqm_sym.runtime.quadrature.lengths import BESIDE_EDGE, length_from_edge
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN, place_at, place_on_libration
-from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block, sum_block
+from gqm_sym.runtime.quadrature.time_panels import DEGREE, sum_block
 
 # The number of times for which states are found together.
 BLOCK = 128
@@ -228,7 +229,8 @@ def fill_motion(record, p, t, n, phases, panels, work, found):  # type: ignore[n
         for i in range(n):
             if phases.phi[i] > BESIDE_END:
                 left = (timing[4] - phases.work[0, i]) + (timing[5] - phases.work[1, i])
-                v[i] *= factor_beside_end(table.scales, table.powers, left, phases.phi[i])
+                to_end = phases.work[2, i] = angle_to_end(table.scales, table.powers, left, phases.phi[i])
+                v[i] *= sin(to_end) / sin(phases.phi[i])
     for i in range(n):
         launched = t[i] == 0.0
         place, speed = place_at(kind, a, b, phases.phi[i]), v[i] * (direction * phases.sense[i] * width_ratio)
@@ -267,7 +269,9 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         arcs.reshape((arcs.size // DEGREE, DEGREE)),
     )
     time_errors, table_errors = section(record, TIME_ERRORS), section(record, TABLE_ERRORS)
-    direction = 1.0 if shape[1] > shape[0] else -1.0
+    scale = width_ratio if shape[1] > shape[0] else -width_ratio
+    turns = section(record, FUNCTIONS).view(np.int64)[5] == TURN_TURN
+    first, last = BESIDE_EDGE * 0.5 * edges[1], edges[-1] - BESIDE_EDGE * 0.5 * (edges[-1] - edges[-2])
     size = min(BLOCK, end - begin)
     # Two arrays serve as all work space, because making an array for each row would take as long as finding the state
     # at one time.
@@ -280,9 +284,12 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         n = min(BLOCK, end - start)
         block, lam = t[start : start + n], out[0, start : start + n]
         fill_motion(record, p, block, n, phases, panels, work, motion)
-        read_off_block(edges, lengths, length_terms, phi, n, panels, spare, arc)
+        sum_block(edges, length_terms, phi, n, panels, work, arc)
         for i in range(n):
-            s = (s_a + direction * width_ratio * arc[i]) + laps[i] * lap_length
+            edge, part = panels[i], arc[i]
+            if turns and not first <= phi[i] <= last:
+                edge, part = length_from_edge(edges, length_terms, edge, phi[i], spare[2, i], (turns, turns))
+            s = ((s_a + scale * lengths[edge]) + scale * part) + laps[i] * lap_length
             arc[i] = choose(block[i] == 0.0, s0, s + s0)
         frame = rows.reshape(-1)[: 5 * n].reshape(5, n)
         call_path_and_contact_force(address, n, reduced, v2, p, frame)

@@ -5,7 +5,7 @@ panel's time is divided into equal segments, as few as a Chebyshev fit of fixed 
 A small uniform index over time finds the segment of a time at once.
 """
 
-from math import fabs
+from math import fabs, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,6 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
-from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.buffers import longer, with_rows
 from gqm_sym.runtime.compiled.intrinsics import fma, item_at
 from gqm_sym.runtime.compiled.jit import Inner, entry
@@ -73,6 +72,9 @@ PARTS_PER_SEGMENT = 32
 # The phase angle from which on its distance from pi follows from the time that is left. Where the two differ by more
 # than the second number, more than a rounding, the last part of the segment takes too little time to be in the table.
 BESIDE_END, MAX_ROUNDING = 3.0, 8.0 * ULP
+
+# What the double pi lacks to pi.
+PI_LOW = 1.2246467991473532e-16
 
 # The number of times that are looked up together.
 BLOCK = 64
@@ -292,13 +294,11 @@ def look_up(table, t, t_low, n, segments, out):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def factor_beside_end(scales, powers, left, phi):  # type: ignore[no-untyped-def]
-    """Return by which factor the speed next to the turning point at the end of a segment is larger than at the rounded
-    phase angle.
+def angle_to_end(scales, powers, left, phi):  # type: ignore[no-untyped-def]
+    """Return what a phase angle next to the turning point at the end of a segment lacks to pi.
 
-    It is proportional to the sine of the phase angle, that is, of what this lacks to pi, most of which is lost where
-    the angle is rounded. It follows from the time that is left, by the divided difference of the polynomial over this
-    time and the end.
+    Most of it is lost where the angle is rounded. It follows from the time that is left, by the divided difference of
+    the polynomial over this time and the end.
 
     Parameters
     ----------
@@ -309,16 +309,16 @@ def factor_beside_end(scales, powers, left, phi):  # type: ignore[no-untyped-def
     phi : float
         The rounded phase angle.
     """
-    k = scales.size - 1
+    k, rounded = scales.size - 1, (pi - phi) + PI_LOW
     share = left * scales[k]
     if not 0.0 < share <= 2.0:  # the end, or beyond the last segment
-        return 1.0
+        return rounded
     total = quotient = powers[k, LAST]
     for j in range(LAST - 1, 0, -1):
         total += powers[k, j]
         quotient = fma(quotient, 1.0 - share, total)
-    exact, rounded = sin(share * quotient), sin(phi)
-    return exact / rounded if fabs(exact - rounded) <= MAX_ROUNDING else 1.0
+    exact = share * quotient
+    return exact if fabs(exact - rounded) <= MAX_ROUNDING else rounded
 
 
 TABLE_TYPE = types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, types.int64[::1], VECTOR, VECTOR))
@@ -343,10 +343,9 @@ def phase_angles(middles, lows, scales, powers, index, ends, t, t_low):  # type:
 
 
 @entry(VECTOR(VECTOR, MATRIX, VECTOR, VECTOR))
-def factors_beside_end(scales, powers, left, phi):  # type: ignore[no-untyped-def]
-    """Return the factors of speeds (`factor_beside_end`) at many phase angles; 1 far from the end."""
-    found = np.ones(phi.size)
+def angles_to_end(scales, powers, left, phi):  # type: ignore[no-untyped-def]
+    """Return what many phase angles lack to pi (`angle_to_end`)."""
+    found = np.empty(phi.size)
     for i in range(phi.size):
-        if phi[i] > BESIDE_END:
-            found[i] = factor_beside_end(scales, powers, left[i], phi[i])
+        found[i] = angle_to_end(scales, powers, left[i], phi[i]) if phi[i] > BESIDE_END else pi - phi[i]
     return found

@@ -28,7 +28,7 @@ from gqm_sym.runtime.legs.variations.answers import (
     places_at,
     points_by_record,
     points_of,
-    states_at,
+    sensitivities_at,
     turning_points,
 )
 from gqm_sym.runtime.legs.variations.changes import Changes
@@ -142,16 +142,15 @@ class DissipativeMotion(FollowedMotion):
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)
-        found = states_at(self._changes, points)
-        fields = (getattr(found, name) for name in Sensitivity._fields[1:])
-        return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
+        found = sensitivities_at(self._changes, points, list(rows.values()))
+        return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
 
     @locked
     def place_changes(self, t: Any, wrt: Any) -> Array:
         """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)
-        found: Array = places_at(self, self._changes, points)[list(rows.values())].reshape(len(rows), *shape)
+        found = places_at(self, self._changes, points, list(rows.values())).reshape(len(rows), *shape)
         self._check_known("sensitivity", rows, found)
         return found
 

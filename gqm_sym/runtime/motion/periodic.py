@@ -23,11 +23,10 @@ from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, requested_quantity
 from gqm_sym.runtime.gradients.panels import UNDECIDED
 from gqm_sym.runtime.gradients.passages.arrival import arrival_slopes
 from gqm_sym.runtime.gradients.quantities import PERIODS, gradient, second_gradient, selected
-from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of
+from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity, points_of
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
 from gqm_sym.runtime.motion.locking import computed_once, lock_of, locked
@@ -179,8 +178,7 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
-        has_waves = self.problem.formulas.chart is None and self._orbit_sensitivity.has_waves
-        sampled = self._sampled_times(t) if has_waves else None
+        sampled = self._sampled_along_waves(t)
         if sampled is not None:
             sampler, times, phi, shape = sampled
             made = self._orbit_sensitivity.at_times(self, sampler.record, times, phi, tuple(rows.values()))
@@ -192,13 +190,17 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def place_changes(self, t: Any, wrt: Any) -> Array:
         """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
-        if self.problem.formulas.chart is not None:
+        sampled = self._sampled_along_waves(t)
+        if sampled is None:
             return super().place_changes(t, wrt)
-        rows = selected(self.problem.formulas.parameters, wrt)
-        (points, phi, shape), f = self._orbit_points(t), self.problem.functions
-        ds = path_and_force_at(f.addresses, f.p, points[PLACE], points[SPEED] ** 2)[2]
-        found = self._orbit_sensitivity.places_at(self, points, phi, ds)
-        return found[list(rows.values())].reshape(len(rows), *shape)
+        rows, (sampler, times, phi, shape) = selected(self.problem.formulas.parameters, wrt), sampled
+        found = self._orbit_sensitivity.places_at_times(self, sampler.record, times, phi, tuple(rows.values()))
+        return found.reshape(len(rows), *shape)
+
+    def _sampled_along_waves(self, t: Any) -> tuple[Sampler, Array, float, tuple[int, ...]] | None:
+        """Return `_sampled_times` if the changes along the orbit are a Fourier series, else None."""
+        has_waves = self.problem.formulas.chart is None and self._orbit_sensitivity.has_waves
+        return self._sampled_times(t) if has_waves else None
 
     def _sampled_times(self, t: Any) -> tuple[Sampler, Array, float, tuple[int, ...]] | None:
         """Return the sampler for times, these, the phase angle of the launch, and their shape; None if there is no

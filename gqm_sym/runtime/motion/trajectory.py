@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus, reduce_many, two_sum
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.inversion.table import BESIDE_END, factors_beside_end
+from gqm_sym.runtime.inversion.table import BESIDE_END, angles_to_end
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
@@ -243,7 +243,9 @@ class PhasePoints:
         """Return the arc length in m from the launch, within the lap."""
         s = np.zeros_like(self.laps)
         for timed, mask, phi in self.segments:
-            s[mask] = timed.s_a + timed.segment.direction * timed.segment.lengths(phi)
+            direction = timed.segment.direction
+            whole, parts = timed.segment.lengths_from_edges(phi, self._to_end(timed, mask, phi))
+            s[mask] = (timed.s_a + direction * whole) + direction * parts
         s[self.at_launch] = 0.0
         return s
 
@@ -257,13 +259,20 @@ class PhasePoints:
 
     def _speeds(self, timed: TimedSegment, mask: NDArray[np.bool_], phi: Array) -> Array:
         """Return |ds/dt| in m/s on a timed segment; beside the turning point at its end, from the time that is left."""
+        speeds, beside = timed.segment.speeds(phi), phi > BESIDE_END
+        if timed.segment.kind == TURN_TURN and beside.any():
+            speeds[beside] *= np.sin(self._to_end(timed, mask, phi)[beside]) / np.sin(phi[beside])
+        return speeds
+
+    def _to_end(self, timed: TimedSegment, mask: NDArray[np.bool_], phi: Array) -> Array:
+        """Return what phase angles lack to the last one; beside a turning point there, from the time that is left."""
         segment = timed.segment
-        speeds = segment.speeds(phi)
-        if segment.kind != TURN_TURN or not phi.max(initial=0.0) > BESIDE_END:
-            return speeds
+        if segment.kind != TURN_TURN:
+            lack: Array = segment.edges[-1] - phi
+            return lack
         r, low = self.trajectory.segment_times(timed, self.reduced[mask], self.reduced_low[mask])
         (_, _, scales, powers, *_), total = segment.table, segment.total_time
-        exact: Array = speeds * factors_beside_end(scales, powers, (total[0] - r) + (total[1] - low), phi)
+        exact: Array = angles_to_end(scales, powers, (total[0] - r) + (total[1] - low), phi)
         return exact
 
 

@@ -314,14 +314,6 @@ def sum_block(edges, terms, phi, n, panels, work, out):  # type: ignore[no-untyp
         out[i] = terms[panels[i], 0] + x[i] * high[i] - 0.5 * low[i]
 
 
-@Inner
-def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ignore[no-untyped-def]
-    """Evaluate `read_off` at n phase angles on known panels, in vector registers; ``work`` has three rows of n."""
-    sum_block(edges, terms, phi, n, panels, work, out)
-    for i in range(n):
-        out[i] += marks[panels[i]]
-
-
 PANELS_TYPE = types.NamedTuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL, types.int64), Panels)
 
 

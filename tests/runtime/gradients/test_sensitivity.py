@@ -182,9 +182,10 @@ def test_shapes_and_names() -> None:
 )
 def test_places_alone(name: str, launch: dict[str, float]) -> None:
     """The derivatives of places alone, which fits use, are those of sensitivities."""
-    motion, times = generated(name).solve(**launch), np.linspace(0.0, 2.0, 9)
+    motion, times = generated(name).solve(**launch), np.linspace(0.0, 2.0, 90)
     wanted = motion.sensitivity(times, ("g", "lam0")).lam
     np.testing.assert_allclose(motion.place_changes(times, ("g", "lam0")), wanted, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(motion.place_changes(1.5, "g"), motion.sensitivity(1.5, "g").lam, rtol=1e-14, atol=0.0)
 
 
 @pytest.mark.parametrize(("name", "v0"), [("ellipse", 0.0), ("circle", 9.0)])

@@ -21,8 +21,8 @@ from gqm_sym.runtime.legs.runs import ends
 
 G = 9.81
 # The relative tolerances of places and times just after a release, which follow from the slope of a polynomial at its
-# beginning, and of arc lengths, which grow with the square of its variable. Worst measured: 1.4e-14 and 7e-7.
-RELEASED, RELEASED_LENGTH = 3e-14, 2e-6
+# beginning, and of arc lengths, which follow from its curvature. Worst measured: 1.4e-14 and 3.7e-13.
+RELEASED, RELEASED_LENGTH = 3e-14, 7e-13
 Build = Callable[..., ModuleType]
 
 

@@ -1,6 +1,6 @@
 """Derivatives of a motion with losses: of states at given times, turning points, ends and extremes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
+from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.inversion.leg_tables import phases_along_legs
 from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
@@ -26,7 +27,7 @@ from gqm_sym.runtime.motion.trajectory import PhasePoints
 MAX_STEP, NEWTON_STEPS = 1e-5, 3
 
 # The number of points that are evaluated together; for more of them the system would provide memory anew each time.
-BLOCK = 2048
+BLOCK = 1024
 
 # An extreme this near to the end of a motion, as a share of its time, counts as the end. An extreme this near to a jump
 # of the force, as a share of the place, counts as being at the jump. At a time later or earlier by the third share, it
@@ -138,31 +139,45 @@ class StateChanges:
     """
 
     def __init__(self, changes: Changes, points: MarchPoints) -> None:
-        starts = range(0, max(points.v.size, 1), BLOCK)
-        parts = [self._part(changes, points.part(slice(start, start + BLOCK))) for start in starts]
-        found, self.states, law = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y, self.arc = found
-        self.labels, self.law = self.lam, LawRows(law)
-
-    def _part(self, changes: Changes, points: MarchPoints) -> tuple[Array, Array, Array]:
-        """Return for some of the points the rows of all attributes, the states, and the law."""
         along = changes.along(points.half, points.w, points.v)
-        law = changes.law.matrix(along.states)
-        return changes.states(along, law, points.v), along.states, law
+        self.states, self.law = along.states, LawRows(changes.law.matrix(along.states))
+        found = changes.states(along, self.law.matrix, points.v)
+        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y, self.arc = found
+        self.labels = self.lam
 
 
-def places_at(motion: Any, changes: Changes, points: MarchPoints) -> Array:
-    """Return the changes of the places of a motion at points."""
-    if changes.law.by_arc_length:  # the change of the arc length is needed too
-        found: Array = states_at(changes, points).lam
-        return found
-    starts = range(0, max(points.v.size, 1), BLOCK)
-    parts = [_places(motion, changes, points.part(slice(start, start + BLOCK))) for start in starts]
-    return np.concatenate(parts, axis=1)
+def places_at(motion: Any, changes: Changes, points: MarchPoints, rows: list[int]) -> Array:
+    """Return the changes of the places of a motion at points, with a row for each of some variables."""
+    found = np.empty((len(rows), points.v.size))
+    for block in _blocks(points.v.size):
+        some = points.part(block)
+        if changes.law.by_arc_length:  # the change of the arc length is needed too
+            found[:, block] = states_at(changes, some).lam[rows]
+        else:
+            found[:, block] = _places(motion, changes, some)[rows]
+    return found
+
+
+def sensitivities_at(changes: Changes, points: MarchPoints, rows: list[int]) -> Array:
+    """Return the changes of the states of a motion at points: for each field of `gradients.sensitivity.Sensitivity` a
+    row for each of some variables.
+    """
+    fields = Sensitivity._fields[1:]
+    found = np.empty((len(fields), len(rows), points.v.size))
+    for block in _blocks(points.v.size):
+        some = states_at(changes, points.part(block))
+        for array, field in zip(found, fields, strict=True):
+            array[:, block] = getattr(some, field)[rows]
+    return found
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    """Yield the parts of so many points that are evaluated together."""
+    return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
 
 
 def _places(motion: Any, changes: Changes, points: MarchPoints) -> Array:
-    """Return what `places_at` does along a curve with formulas."""
+    """Return the changes of places along a curve with formulas, with respect to all variables."""
     v, f = points.v, motion.problem.functions
     along = changes.along(points.half, points.w, v, whole=False)
     ds = path_and_force_at(f.addresses, f.p, along.states[0], v**2)[2]

@@ -1,7 +1,7 @@
 """Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
 from collections.abc import Iterable
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,12 @@ from gqm_sym.runtime.motion.parts.positions import Positions
 
 # The longest time in s after a launch from a cusp from which the derivatives of the contact force there follow.
 LONGEST_START = 16.0
+
+
+def _is_unknown(value: Any) -> bool:
+    """Return whether a derivative, or one of several, is NaN."""
+    # NumPy takes microseconds for one number.
+    return bool(isnan(value) if type(value) is float else np.isnan(value).any())
 
 
 class Derivatives(Positions):
@@ -104,7 +110,7 @@ class Derivatives(Positions):
         charted = self.problem.formulas.chart is not None
         if not charted and self.problem.w0 != 0.0:
             return
-        unknown = [name for name, value in zip(names, values, strict=True) if np.isnan(value).any()]
+        unknown = [name for name, value in zip(names, values, strict=True) if _is_unknown(value)]
         if unknown and (charted or self._is_at_rest_in_cusp):
             if charted:
                 why = "the curve does not exist for neighbouring values (an exponent of a negative number must be an "

@@ -14,6 +14,7 @@ from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.motion.segments.conditioning import launch_condition_number, v2_correction
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
+from gqm_sym.runtime.quadrature.lengths import lengths_from_edges
 from gqm_sym.runtime.quadrature.regular_factors import regular_factors
 from gqm_sym.runtime.quadrature.running_totals import running_totals
 from gqm_sym.runtime.quadrature.substitution import (
@@ -387,8 +388,16 @@ class Segment:
 
     def lengths(self, phi: Array) -> Array:
         """Return the arc length in m from the end ``a`` to phase angles."""
-        lengths: Array = read_off_many(self.panels[0], self.panels[2], self.panels[4], phi)
-        return lengths * self.width_ratio
+        whole, parts = self.lengths_from_edges(phi, self.panels[0][-1] - phi)
+        return whole + parts
+
+    def lengths_from_edges(self, phi: Array, to_end: Array) -> tuple[Array, Array]:
+        """Return the arc length in m from the end ``a`` to edges of panels near phase angles, and from there to these,
+        given what they lack to the last one.
+        """
+        edges, marks, terms, between = self.panels[0], self.panels[2], self.panels[4], self.kind == TURN_TURN
+        whole, parts = lengths_from_edges(edges, marks, terms, (between or self.growth[1] == 0.0, between), phi, to_end)
+        return whole * self.width_ratio, parts * self.width_ratio
 
     @property
     def width_ratio(self) -> float:
