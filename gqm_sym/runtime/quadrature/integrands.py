@@ -153,10 +153,9 @@ def fill_speeds(integrand, phi, work, out):  # type: ignore[no-untyped-def]
             s, c = sine(0.5 * phi[i]), cosine(0.5 * phi[i])
             da[i] = (b - a) * s * s
             db[i] = (b - a) * c * c
-            out[i] = fabs((b - a) * s * c)  # the product of both offsets may underflow
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            out[i] *= sqrt(2.0 * rows[0, i])
+            out[i] = sqrt(fabs(da[i])) * sqrt(2.0 * fabs(db[i]) * rows[0, i])  # the product of both may underflow
     elif kind == TO_EQUILIBRIUM:
         for i in range(n):
             da[i] = (a - b) * exp(-phi[i])

@@ -11,7 +11,7 @@ from mpmath import mpf
 import gqm_sym as gqm
 
 # Launches from rest in the potential cos x + x**2/2, which is x**4/24 to first order beside its minimum.
-PLACES = (1.3, -0.7, 0.3, 0.193, -0.1, 0.05, 0.0167, 0.009)
+PLACES = (1.3, 0.193, -0.1, 0.009)
 
 
 @pytest.fixture(scope="module")
@@ -38,5 +38,5 @@ def test_largest_speed_in_a_flat_well(flat: ModuleType) -> None:
 
 def test_a_well_too_flat_for_a_search(flat: ModuleType) -> None:
     """Where steps are as short as the well is flat, the launch is refused for this; it was said to go on for ever."""
-    with pytest.raises(gqm.errors.SolutionError, match="turning points from x = 0.005: too many places"):
+    with pytest.raises(gqm.errors.SolutionError, match=r"turning points from x = 0\.005: too many places"):
         flat.solve(0.005, 0, 1)
