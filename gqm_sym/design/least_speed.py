@@ -24,7 +24,7 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import LaunchRequest, check_contact, read_launch
 from gqm_sym.runtime.launch.rider import FIELDS, STANDARD_GRAVITY, rider_loads
 from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
-from gqm_sym.runtime.motion.extremes import grid_peaks
+from gqm_sym.runtime.motion.parts.peaks import grid_peaks
 
 # The number of steps of the first grid over the range; a maximum narrower than one step may be missed.
 FIRST_STEPS = 4096

@@ -16,7 +16,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.domain import Domain
 from gqm_sym.runtime.launch.request import LaunchRequest
 from gqm_sym.runtime.model import CompiledModel
-from gqm_sym.runtime.motion.extremes import grid_peaks
+from gqm_sym.runtime.motion.parts.peaks import grid_peaks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -146,7 +146,7 @@ class DissipativeMotion(FollowedMotion):
         return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
 
     @locked
-    def place_changes(self, t: Any, wrt: Any) -> Array:
+    def place_changes(self, t: Any, wrt: Any = None) -> Array:
         """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)

@@ -40,7 +40,7 @@ from gqm_sym.runtime.legs.panels.equation import March, copy, distance, marched
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable, share_at
 from gqm_sym.runtime.legs.runs.whole_rows import whole_time_row
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, blocks_of, to_coefficients
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, blocks_of, grade_of, to_coefficients, variable_at
 
 
 def _to_legendre() -> tuple[Array, Array]:
@@ -172,19 +172,32 @@ def place_at(record, time):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def time_by_series_in_phase(terms, count, phase, backwards):  # type: ignore[no-untyped-def]
-    """Return the result of `time_to_phase` for the ``count`` coefficients of a series in the phase angle."""
-    x, odd = 2.0 / pi * phase - 1.0, -1.0 if backwards else 1.0
+def rate_of_variable(terms, grade, count, k):  # type: ignore[no-untyped-def]
+    """Return a coefficient of the time per variable u over pi, given those of the time per phase angle."""
+    here = terms[k] if k < count else 0.0
+    if grade == 1:
+        return here
+    # The derivative of the phase angle is pi times 6 u (1 - u), which is (3/4)(1 - T_2(x)).
+    beside = (terms[k + 2] if k + 2 < count else 0.0) + (terms[abs(k - 2)] if 0 < k < count + 2 else 0.0)
+    return 0.75 * here - 0.375 * (beside + (terms[0] if k == 2 else 0.0))
+
+
+@Inner
+def time_by_series(terms, grade, count, phase, backwards):  # type: ignore[no-untyped-def]
+    """Return the result of `time_to_phase` for the ``count`` coefficients of a series in the variable of a grade."""
+    x, odd = 2.0 * variable_at(grade, phase) - 1.0, -1.0 if backwards else 1.0
     rate, rate_after, time, time_after, at_start, here, after = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(count, 0, -1):
-        before = terms[k - 1] if k % 2 == 1 else odd * terms[k - 1]
+    for k in range(count if grade == 1 else count + 2, 0, -1):
+        before = rate_of_variable(terms, grade, count, k - 1)
+        before = before if k % 2 == 1 else odd * before
         # The integral of the series has the coefficients (c_(k-1) - c_(k+1))/(2 k); c_0 counts twice.
         area = 0.5 * ((2.0 * before if k == 1 else before) - after) / k
-        rate, rate_after = fma(2.0 * x, rate, here - rate_after), rate
         time, time_after = fma(2.0 * x, time, area - time_after), time
         at_start += area if k % 2 == 0 else -area
         after, here = here, before
-    return 0.5 * pi * (fma(x, time, -time_after) - at_start), fma(x, rate, here - rate_after)
+    for k in range(count - 1, 0, -1):
+        rate, rate_after = fma(2.0 * x, rate, (terms[k] if k % 2 == 0 else odd * terms[k]) - rate_after), rate
+    return 0.5 * pi * (fma(x, time, -time_after) - at_start), fma(x, rate, terms[0] - rate_after)
 
 
 @Inner
@@ -197,7 +210,7 @@ def time_to_phase(terms, form, phase, backwards):  # type: ignore[no-untyped-def
     """
     sign, count = 1.0 if backwards else -1.0, blocks_of(form) * WIDE - 1
     if form > MAX_BLOCKS:
-        return time_by_series_in_phase(terms, count, phase, backwards)
+        return time_by_series(terms, grade_of(form), count, phase, backwards)
     # The sum of c_k cos(k phase), with the signs of c_k that the direction requires, and its integral.
     c, s = cos(phase), sin(phase)
     rate, rate_after, time, time_after = 0.0, 0.0, 0.0, 0.0

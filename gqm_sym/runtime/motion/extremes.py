@@ -1,12 +1,11 @@
-"""Extremes of a function on an interval by successively finer grids, and of speed and contact force along a motion."""
+"""Extremes of speed and contact force along a motion."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from math import copysign
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
@@ -15,6 +14,7 @@ from gqm_sym.runtime.launch.poles import pole_ahead
 from gqm_sym.runtime.motion.events import contact_force_at, contact_force_on
 from gqm_sym.runtime.motion.parts.before_joint import loss_at_joint
 from gqm_sym.runtime.motion.parts.beside_cusp import force_beside_cusp
+from gqm_sym.runtime.motion.parts.peaks import peak_between
 from gqm_sym.runtime.motion.parts.searched import EQUAL_ROUNDINGS, samples, size_of, trajectory_with_extreme
 from gqm_sym.runtime.motion.parts.stationary_speeds import exact_speed
 from gqm_sym.runtime.motion.segments.segment import Segment
@@ -23,16 +23,12 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.problem import Problem
 
-# The number of points of each of the finer grids, and the number of these grids, each of which is 64 times as fine as
-# the one before.
-GRID_POINTS, GRIDS = 129, 8
-
 # The number of the largest samples near which an extreme is searched for.
 MAX_PEAKS = 4
 
-# The number of nodes of the polynomial by which a peak is located, and the share of its last coefficients below which
-# it counts as exact.
-PEAK_NODES, MAX_TAIL = 13, 1e-12
+# A sample is not a peak to be located if a peak beside it would have to exceed it by more than so many times what its
+# lower neighbour lacks to it. A parabola exceeds it by an eighth of that at most.
+MAX_EXCESS = 4.0
 
 # The distance from an end of a segment within which a peak counts as being at the end, as a share of the segment.
 END_SHARE = 1e-9
@@ -42,10 +38,6 @@ BEFORE_JOINT = 1e-13
 
 # The share of the contact force by which it must jump at a joint; the pieces of a smooth chart differ by less.
 LEAST_JUMP = 1e-11
-
-# The distance from a sample at which a value belongs to its own side, if the quantity jumps at the sample; as a share
-# of the phase angle.
-BESIDE_JOINT = 64.0 * ULP
 
 # A body comes to rest at a cusp if V**2 there is at most so many roundings of its largest value.
 STOPPED_ROUNDINGS = 64.0
@@ -57,46 +49,6 @@ UNBOUNDED_GROWTH = 1e6
 # At a pole of the potential the speed is infinite, and so is the contact force if it grows by this factor on the last
 # segment.
 POLE_GROWTH = 1.2
-
-
-class Peak(NamedTuple):
-    """The largest value on a grid.
-
-    Attributes
-    ----------
-    place, value : float
-        The place of the largest value, and the value.
-    low, high : float
-        The neighbouring grid points, between which the next grid lies.
-    """
-
-    place: float
-    value: float
-    low: float
-    high: float
-
-
-def grid_peaks(
-    function: Callable[[Array], Array], low: float, high: float, points: int = GRID_POINTS, grids: int = GRIDS
-) -> Iterator[Peak]:
-    """Yield the largest values of a function on successively finer grids, each between the neighbours of the peak
-    before.
-
-    Parameters
-    ----------
-    function : callable
-        A function that takes an array of places and returns an array of values. A NaN counts as the largest value.
-    low, high : float
-        The ends of the first grid.
-    points, grids : int
-        The number of points of each grid, and the number of grids.
-    """
-    for _ in range(grids):
-        places = np.linspace(low, high, points)
-        values = function(places)
-        k = int(np.argmax(values))
-        low, high = places[max(k - 1, 0)], places[min(k + 1, points - 1)]
-        yield Peak(float(places[k]), float(values[k]), float(low), float(high))
 
 
 class Extreme(NamedTuple):
@@ -134,6 +86,8 @@ class Quantity(NamedTuple):
         Whether the quantity is a quadratic polynomial of the speed at each place.
     is_length : bool
         Whether its square is a quadratic polynomial of V**2 at each place, as that of a contact force in space.
+    is_even : bool
+        Whether it is known to be the same for both directions of motion at each place.
     """
 
     at: Callable[..., Array]
@@ -141,6 +95,7 @@ class Quantity(NamedTuple):
     beside: Callable[[TimedSegment, Array, Array], Array] | None = None
     is_quadratic: bool = True
     is_length: bool = False
+    is_even: bool = False
 
 
 def _speeds(timed: TimedSegment, phi: Array, share: float = 1.0) -> Array:
@@ -148,14 +103,15 @@ def _speeds(timed: TimedSegment, phi: Array, share: float = 1.0) -> Array:
 
 
 # |ds/dt| in m/s.
-SPEED = Quantity(_speeds, lambda state: abs(state.v))
+SPEED = Quantity(_speeds, lambda state: abs(state.v), is_even=True)
 
 
 def force_of(problem: "Problem") -> Quantity:
     """Return the contact force in N, as a quantity along motions."""
     at, beside = partial(contact_force_on, problem), partial(contact_force_at, problem)
     signed, directed = bool(problem.formulas.signed), bool(problem.formulas.directed)
-    return Quantity(at, lambda state: float(state.normal_force), beside, signed, not (signed or directed))
+    is_length = not (signed or directed)
+    return Quantity(at, lambda state: float(state.normal_force), beside, signed, is_length, not directed)
 
 
 def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
@@ -189,10 +145,17 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
         if value > 0.0 and (quantity is SPEED or value > POLE_GROWTH * abs(first)):
             return _extreme_at(last, trajectory, last.phi_stop, sign * np.inf)
     best: Extreme | None = None
+    searched: dict[int, list[tuple[float, float]]] = {}
     for timed in trajectory.segments:
         if timed.t_start[0] >= end and best is not None:
             break
-        size, peaks = _on_segment(motion.problem, timed, trajectory, quantity, sign, end)
+        ends = sorted(phases(timed, trajectory, end))
+        before = searched.setdefault(id(timed.segment), [])
+        if any(low <= ends[0] and ends[1] <= high for low, high in before) and quantity.is_even:
+            continue  # the body comes back the same way
+        before.append((ends[0], ends[1]))
+        least = -np.inf if best is None else sign * best.value
+        size, peaks = _on_segment(motion.problem, timed, trajectory, quantity, sign, (end, least))
         for value, t, lam in peaks:
             if best is None or sign * (value - best.value) > EQUAL_ROUNDINGS * ULP * size:
                 best = Extreme(value, min(t, end), lam)  # the time of the end itself may be rounded up
@@ -209,10 +172,18 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
 
 
 def _on_segment(
-    problem: "Problem", timed: TimedSegment, trajectory: Trajectory, quantity: Quantity, sign: int, end: float
+    problem: "Problem",
+    timed: TimedSegment,
+    trajectory: Trajectory,
+    quantity: Quantity,
+    sign: int,
+    limits: tuple[float, float],
 ) -> tuple[float, list[Extreme]]:
-    """Return the size of a quantity on a timed segment up to the time ``end``, and its peaks in the order of time."""
-    segment = timed.segment
+    """Return the size of a quantity on a timed segment up to a time, and its peaks in the order of time.
+
+    The second of the ``limits`` is a value times the sign; of peaks that do not reach it, some may be left out.
+    """
+    segment, (end, least) = timed.segment, limits
     start, stop = phases(timed, trajectory, end)
     if timed.end == "liftoff" and quantity is not SPEED:
         stop -= _share_at_joint(timed) * (stop - start)  # the body leaves before the load beyond the joint acts
@@ -240,11 +211,17 @@ def _on_segment(
     ):
         values[at_cusp] = copysign(np.inf, values[at_cusp])
     size = size_of(values)
-    for k in _peaks(values, size)[:MAX_PEAKS]:
+    if least > -np.inf and not _may_reach(values, least):
+        return size, sorted(found, key=lambda peak: peak.t)
+    in_time = np.arange(phi.size) if stop > start else np.arange(phi.size)[::-1]
+    for k in in_time[_peaks(values[in_time], size)[:MAX_PEAKS]].tolist():
         if values[k] == np.inf:
             found.append(_extreme_at(timed, trajectory, stop, sign * np.inf))
             continue
-        angle = _peak(signed, float(phi[max(k - 1, 0)]), float(phi[k]), float(phi[min(k + 1, phi.size - 1)]))
+        first, last = max(k - 1, 0), min(k + 1, phi.size - 1)
+        if least > -np.inf and not _may_reach(values[first : last + 1], least):
+            continue
+        angle = peak_between(signed, float(phi[first]), float(phi[k]), float(phi[last]))
         if np.abs(joints - angle).min(initial=np.inf) < END_SHARE * (high - low):
             continue  # the limits at the joint count
         value = float(signed(np.array([angle]))[0])
@@ -292,9 +269,17 @@ def _limits_at_joints(
     ]
 
 
+def _may_reach(values: Array, least: float) -> bool:
+    """Return whether a quantity may reach a value beside one of its samples."""
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    with np.errstate(invalid="ignore"):  # infinite values
+        reach = values + MAX_EXCESS * (values - np.minimum(padded[:-2], padded[2:]))
+    return bool((reach >= least).any())
+
+
 def _peaks(values: Array, size: float) -> list[int]:
-    """Return the indices of samples that no neighbour exceeds, the largest first; of samples side by side that are
-    equal within rounding, at most the first and the largest.
+    """Return the indices of samples in the order of time that no neighbour exceeds, the largest first; of samples side
+    by side that are equal within rounding, at most the first and the largest.
     """
     padded = np.concatenate([[-np.inf], values, [-np.inf]])
     peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:])).tolist()
@@ -329,34 +314,6 @@ def _share_at_joint(timed: TimedSegment) -> float:
         return 0.0
     start = float(timed.segment.places(np.array([timed.phi_start]))[0])
     return min(max(BEFORE_JOINT, 2.0 * loss.near / abs(loss.last - start)), 0.5) if loss.last != start else 0.5
-
-
-def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:
-    """Return the place at which a function is largest between two places, given its largest sample between them."""
-    if low == high:
-        return middle
-    nodes = np.cos(np.pi * (np.arange(PEAK_NODES) + 0.5) / PEAK_NODES)
-    values = function(0.5 * (low + high) + 0.5 * (high - low) * nodes)
-    beside = min(BESIDE_JOINT * max(abs(low), abs(high)), 0.5 * (high - low))
-    candidates = [low + beside, high - beside, low, middle, high]
-    if np.isfinite(values).all():
-        terms = chebyshev.chebfit(nodes, values, PEAK_NODES - 1)
-        if np.abs(terms[-2:]).max() <= MAX_TAIL * np.abs(terms).max():
-            roots = chebyshev.chebroots(chebyshev.chebder(terms))
-            real = roots.real[(np.abs(roots.imag) < 1e-6) & (np.abs(roots.real) <= 1.0)]
-            candidates += (0.5 * (low + high) + 0.5 * (high - low) * real).tolist()
-            return _largest(function, candidates)
-    *_, peak = grid_peaks(function, low, high)
-    return _largest(function, [*candidates, peak.place])
-
-
-def _largest(function: Callable[[Array], Array], places: list[float]) -> float:
-    """Return the place with the largest value; if several are equal within rounding, the last one, which was computed
-    most carefully.
-    """
-    values = function(np.array(places))
-    limit = values.max() - 2.0 * ULP * size_of(values)
-    return [place for place, value in zip(places, values, strict=True) if value >= limit][-1]
 
 
 def _extreme_at(timed: TimedSegment, trajectory: Trajectory, phi: float, value: float) -> Extreme:

@@ -60,3 +60,20 @@ def locked(method: Callable[Concatenate[T, P], R]) -> Callable[Concatenate[T, P]
             return method(self, *args, **keywords)
 
     return cast(Callable[Concatenate[T, P], R], one_at_a_time)
+
+
+def kept(method: Callable[[T], R]) -> Callable[[T], R]:
+    """Return a method without arguments that runs once for each object, under its lock; its answer is kept."""
+    name = f"_{method.__name__}"
+
+    @wraps(method)
+    def known_or_found(self: T) -> R:
+        attributes = self.__dict__
+        if name not in attributes:
+            with lock_of(self):
+                if name not in attributes:
+                    attributes[name] = method(self)
+        found: R = attributes[name]
+        return found
+
+    return known_or_found

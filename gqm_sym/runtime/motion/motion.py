@@ -7,7 +7,7 @@ from gqm_sym.errors import SolutionError, renamed
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.launch.request import LEAST_SPEED, Launch, LaunchRequest
 from gqm_sym.runtime.motion.extremes import SPEED, Extreme, extreme, force_of
-from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.locking import kept, locked
 from gqm_sym.runtime.motion.parts.derivatives import Derivatives
 from gqm_sym.runtime.motion.parts.history import History
 from gqm_sym.runtime.motion.parts.searched import swings_below
@@ -109,7 +109,7 @@ class Motion(History, Derivatives):
     # -- extremes, and what passengers feel ---------------------------------------------------
 
     @property
-    @locked
+    @kept
     def v_max(self) -> Extreme:
         """The largest speed, its time and its place, over one period or over the whole motion.
 
@@ -129,19 +129,19 @@ class Motion(History, Derivatives):
         raise SolutionError(f"v_max: the speed is below {LEAST_SPEED:g} m/s, and its square is beyond doubles")
 
     @property
-    @locked
+    @kept
     def v_min(self) -> Extreme:
         """The least speed; as `v_max`. It is 0 at a turning point."""
         return extreme(self, SPEED, -1)
 
     @property
-    @locked
+    @kept
     def normal_force_max(self) -> Extreme:
         """The largest contact force along the normal; as `v_max`."""
         return extreme(self, force_of(self.problem), 1)
 
     @property
-    @locked
+    @kept
     def normal_force_min(self) -> Extreme:
         """The least contact force along the normal, which may be negative; as `v_max`."""
         return extreme(self, force_of(self.problem), -1)

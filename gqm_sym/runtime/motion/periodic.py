@@ -188,7 +188,7 @@ class PeriodicMotion(PeriodicTimes):
         return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
 
     @locked
-    def place_changes(self, t: Any, wrt: Any) -> Array:
+    def place_changes(self, t: Any, wrt: Any = None) -> Array:
         """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         sampled = self._sampled_along_waves(t)
         if sampled is None:

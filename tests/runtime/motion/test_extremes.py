@@ -1,5 +1,6 @@
 """Extremes of speed and of the contact force, their times and places agree with closed forms and dense samples."""
 
+from importlib import import_module
 from math import cos, pi, sin, sqrt
 from pathlib import Path
 from types import ModuleType
@@ -12,7 +13,6 @@ import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime import Motion
-from gqm_sym.runtime.motion import extremes
 
 NAMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
 
@@ -256,18 +256,6 @@ def test_a_load_that_falls_up_to_a_joint(mu: float, tmp_path: Path) -> None:
     assert module.sweep("normal_force_min", [0.0], v0, 1).values[0] == pytest.approx(found.value, rel=1e-14)
 
 
-@pytest.mark.parametrize("width", [0.0, 2.0**-53, 2.0**-50, 2.0**-46, 1e-3])
-def test_a_peak_is_sought_between_its_neighbours_only(width: float) -> None:
-    """On a panel of the width of a few roundings, polynomials mean nothing beside it."""
-    low, high = 1.0 - width, 1.0
-
-    def values(places: np.ndarray) -> np.ndarray:
-        assert np.all((places >= low) & (places <= high))
-        return places
-
-    assert extremes._peak(values, low, high, high) >= high - 2.0 * 2.0**-52
-
-
 @pytest.fixture(scope="module")
 def stadium(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     """Return a closed rail of two level lines and two half circles of 1 m."""
@@ -312,3 +300,14 @@ def test_the_speed_on_a_level_line(stadium: ModuleType, v0: float) -> None:
     least, largest = motion.v_min.value, motion.v_max.value
     assert least <= v0 <= largest
     assert (least, largest) == pytest.approx((v0, v0), rel=1e-13)
+
+
+@pytest.mark.parametrize(("place", "speed"), [(-0.5, 0.0), (0.875, 0.34), (-0.4, 4.4)])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_constant_force_is_extreme_at_the_launch(place: float, speed: float, direction: int) -> None:
+    """A contact force that is constant has its largest and its least value at the launch, where it is first reached,
+    whichever way the body moves.
+    """
+    motion = import_module("generated.line_spring").solve(place, speed, direction)
+    for found in (motion.normal_force_max, motion.normal_force_min):
+        assert found == (pytest.approx(2.704, rel=1e-15), 0.0, place)

@@ -16,7 +16,7 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.runtime.motion import periodic
-from gqm_sym.runtime.motion.locking import computed_once, lock_of
+from gqm_sym.runtime.motion.locking import computed_once, kept, lock_of
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -148,3 +148,28 @@ def test_objects_compute_at_the_same_time() -> None:
         assert [*pool.map(lambda one: one.answer, slow)] == [1, 1]
     assert [one.answer for one in slow] == [1, 1]  # computed once
     assert Slow.answer.__doc__ == "The answer."
+
+
+def test_an_answer_is_kept() -> None:
+    """What many threads ask at once is computed once, under the lock of the object, and kept until that is gone."""
+    begun, calls = Barrier(THREADS), list[int]()
+
+    class Asked:
+        @kept
+        def answer(self) -> list[int]:
+            calls.append(1)
+            return [len(calls)]
+
+    asked = Asked()
+
+    def ask(_: int) -> list[int]:
+        begun.wait()
+        return asked.answer()
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        first, *others = pool.map(ask, range(THREADS))
+    assert first == [1]
+    assert all(other is first for other in others)
+    assert Asked().answer() == [2]
+    motion = import_module("generated.circle").solve(1.2)
+    assert motion.v_max is motion.v_max

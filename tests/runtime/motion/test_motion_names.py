@@ -14,7 +14,6 @@ from gqm_sym.runtime.launch import kinds
 from gqm_sym.runtime.launch.speed import Pass1
 from gqm_sym.runtime.motion.at_rest import MotionAtRest
 from gqm_sym.runtime.motion.events import Event, Leg
-from gqm_sym.runtime.motion.extremes import grid_peaks
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.sweep import quantities
@@ -98,11 +97,3 @@ def test_sweeps_and_gradients_ask_what_a_motion_has() -> None:
         assert f"`{name}`" in page
     for name in kinds.QUANTITIES:
         assert f'"{name}"' in str(Motion.gradient.__doc__)
-
-
-def test_ever_finer_grids_find_a_peak() -> None:
-    """A peak inside the range is found to a step of the last grid, and one at an end exactly."""
-    *_, inside = grid_peaks(lambda x: -abs(x - 0.3), 0.0, 1.0)
-    assert abs(inside.place - 0.3) <= 2**-49
-    *_, at_end = grid_peaks(lambda x: x, 0.0, 1.0)
-    assert (at_end.place, at_end.value) == (1.0, 1.0)

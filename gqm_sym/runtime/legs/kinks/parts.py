@@ -40,7 +40,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     product,
     solution_row,
 )
-from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
+from gqm_sym.runtime.legs.panels.point import SMOOTH_AT_REST, point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.runs.branch_points import branch_beside
@@ -366,7 +366,7 @@ def run_past_kinks(forces, start, branch, route, expected, record):  # type: ign
         nu = sign_of_load(forces, start.place, 0.0, point_buffer())
     part = PartStart((start.place, start.place_low), 0.0, False, 0.0, 0.0, 0.0, 0.0, reading.best)
     work, blocks, rest = whole_buffer(), 0, expected if expected > 0.0 else inf
-    choose_variable(0.0, work)
+    choose_variable(SMOOTH_AT_REST, 0.0, work)
     for _ in range(MAX_TRIES if nu != 0 and nu != -route.only_sign else 0):
         march, panel = March(part.place, v, 0.0, 1.0), Panel(0.0, part.v2, nu, (-inf, inf))
         place, room, stop = stop_ahead(start, route, part, rest)

@@ -45,6 +45,10 @@ TAIL_RATIO = 4e-16
 # Below this ratio coefficients that no longer decrease are rounding noise, not structure.
 NOISE_LEVEL = 1e-9
 
+# The same for a function that may have branch points at its ends. Its coefficients decrease like a power of the degree,
+# which looks like noise.
+STRICT_LEVEL = 1e-14
+
 # The same ratio for N if it has one sign at all nodes, because its changes of sign are not decided more accurately
 # (`point.ZERO_TOLERANCE`); and the ratio if N is far from zero throughout.
 ONE_SIGN_RATIO, FAR_FROM_ZERO_RATIO = 1e-14, 1e-7
@@ -96,11 +100,11 @@ def set_sizes(v2, factor, work):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def are_fine(tail, middle, size):  # type: ignore[no-untyped-def]
+def are_fine(tail, middle, size, noise):  # type: ignore[no-untyped-def]
     """Return whether last coefficients of the size ``tail``, and some in the middle, are those of a resolved
-    function.
+    function; ``noise`` is NOISE_LEVEL, or STRICT_LEVEL.
     """
-    return tail <= TAIL_RATIO * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
+    return tail <= TAIL_RATIO * size or (middle <= noise * size and tail >= 0.05 * middle)
 
 
 @Inner
@@ -110,7 +114,7 @@ def examine(work, row, size):  # type: ignore[no-untyped-def]
     """
     to_tails(work, row, work, TAILS)
     tail, middle = tail_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
-    return tail, middle, are_fine(tail, middle, size)
+    return tail, middle, are_fine(tail, middle, size, NOISE_LEVEL)
 
 
 @Inner

@@ -98,7 +98,7 @@ def is_resolved(forces, march, panel, blocks, variable, kinks, work):  # type: i
 
 
 @Inner
-def run_to_target(forces, start, branch, slope_at_rest, route, off, record):  # type: ignore[no-untyped-def]
+def run_to_target(forces, start, branch, rest, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from a turn to the place whose passage is to be found, if it passes it fast on one polynomial.
 
     Parameters and Returns are those of `whole_leg.run_whole`; the end, if there is one, has the code END_PAUSE.
@@ -114,7 +114,7 @@ def run_to_target(forces, start, branch, slope_at_rest, route, off, record):  # 
             nu = sign_of_load(forces, start.place, 0.0, point_buffer())
         work, panel, blocks = whole_buffer(), Panel(0.0, 0.0, nu, span), 1 if nu != 0 and nu != -route.only_sign else 0
         attempt = first_attempt(blocks, branch, march, h)
-        choose_variable(slope_at_rest * h, work)
+        choose_variable(rest, h, work)
         begin_leg(1, work)
         while attempt.blocks > 0:
             blocks, variable = attempt.blocks, attempt.variable

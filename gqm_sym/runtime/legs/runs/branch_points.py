@@ -10,6 +10,7 @@ import numpy as np
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack, over_rows
+from gqm_sym.runtime.legs.kinks.places import note_place
 from gqm_sym.runtime.legs.panels.equation import (
     DS,
     EXPM1_Q,
@@ -36,15 +37,24 @@ from gqm_sym.runtime.legs.runs.leg_variable import (
     variable_for,
 )
 from gqm_sym.runtime.legs.runs.whole_rows import (
-    VARIABLE,
+    BETWEEN_TURNS,
+    GRADE,
     begin_leg,
     examine_row,
     keep_positive,
+    sample_leg,
     size_of_row,
     size_row,
     v2_row,
 )
-from gqm_sym.runtime.legs.runs.whole_tables import IN_PHASE, MAX_BLOCKS, to_coefficients, to_nodes, to_tails
+from gqm_sym.runtime.legs.runs.whole_tables import (
+    IN_SHARE,
+    MAX_BLOCKS,
+    to_coefficients,
+    to_nodes,
+    to_tails,
+    variable_at,
+)
 
 # The largest number of steps of Newton's method to a branch point, and the last step as a share of its height. The map
 # need not be that of the exact place.
@@ -67,7 +77,8 @@ LEAST_PART = 0.1
 # near.
 LEAST_GAIN = 1.05
 
-factor_of_v2_row = over_rows(lambda w, y, bend: w / (y + bend * (y * y)), WIDE)
+factor_of_v2_row = over_rows(lambda w, vanishing: w / vanishing, WIDE)
+product_row = over_rows(lambda y: y - y * y, WIDE)
 
 series_buffer, terms_buffer = on_stack(WIDE), on_stack(MAX_BLOCKS * WIDE)
 
@@ -149,8 +160,13 @@ def zero_beside(work):  # type: ignore[no-untyped-def]
     if y > 0.0:
         to_coefficients(1, work, SERIES, terms, 0)
         x, y = zero_of_series(terms, x, y)
-        if work[VARIABLE] == IN_PHASE:
+        if work[GRADE] > IN_SHARE:
             phase, height = 0.5 * pi * (1.0 + x), 0.5 * pi * y
+            if work[GRADE] == 2.0:  # pi (3 u**2 - 2 u**3) = pi u**2 (3 - 2 u), with 2 u = 1 + x + i y
+                u, v = 0.5 * (1.0 + x), 0.5 * y
+                real, imaginary, rest = u * u - v * v, 2.0 * u * v, 3.0 - 2.0 * u
+                phase = pi * (real * rest + 2.0 * v * imaginary)
+                height = pi * (imaginary * rest - 2.0 * v * real)
             x, y = -cos(phase) * cosh(height), fabs(sin(phase) * sinh(height))
     return (x, y) if fabs(x) <= 1.0 and 0.0 < y <= MAX_HEIGHT else (np.nan, np.nan)
 
@@ -204,6 +220,26 @@ def branch_of_turning(march, width, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def note_branch_of_turning(forces, march, panel, blocks, variable, kinks, work):  # type: ignore[no-untyped-def]
+    """Note the place beside a leg over which the turning rate has a branch point, if that is what the last coefficients
+    of the force are due to; return whether there is one.
+
+    The turning rate of a planar curve has a sign, and no branch points; legs past places where it vanishes are those
+    past kinks.
+    """
+    if forces.squared_contact == 0 or not forces.linear or kinks.size == 1 or kinks[0] < 0.0:
+        return False
+    if not (sample_leg(forces, march, panel, blocks, variable, work) and is_bent_by_turning(blocks, work)):
+        return False
+    begin_leg(1, work)
+    h = variable.width
+    if not sample_leg(forces, march, panel, 1, unstretched(h), work):
+        return False
+    place = branch_of_turning(march, h, work)
+    return place == place and note_place(place, kinks)
+
+
+@Inner
 def first_attempt(blocks, branch, march, width):  # type: ignore[no-untyped-def]
     """Return the first attempt to resolve a leg of about this width."""
     variable = variable_for(branch, march.origin, march.direction, width)
@@ -253,18 +289,18 @@ def next_attempt(attempt, onwards, ratio, march, work):  # type: ignore[no-untyp
 
 
 @Inner
-def fill_phases(work, row, shares):  # type: ignore[no-untyped-def]
-    """Fill a row with the phase angles at a row of shares of the way, as shares of pi."""
+def fill_variable(work, row, shares):  # type: ignore[no-untyped-def]
+    """Fill a row with the variable u of the grade of a leg at a row of shares of the way."""
     for j in range(WIDE):
-        work[row + j] = 2.0 / pi * asin(sqrt(min(work[shares + j], 1.0)))
+        work[row + j] = variable_at(int(work[GRADE]), 2.0 * asin(sqrt(min(work[shares + j], 1.0))))
 
 
 @Inner
-def carry_v2(forces, known, old, blocks, new, bend, work):  # type: ignore[no-untyped-def]
+def carry_v2(forces, known, old, blocks, new, vanishing, work):  # type: ignore[no-untyped-def]
     """Fill in the nodes, and the row W as far as it is known; return whether it is.
 
     It is not carried into a variable that is less stretched, nor if the forces are linear in V**2. What is carried is
-    ``W/(y + bend y**2)``, because the law may depend on the digits of the root of W beside a turn.
+    W over ``y (1 - y)``, or over y, because the law may depend on the digits of the root of W beside a turn.
 
     Parameters
     ----------
@@ -275,7 +311,7 @@ def carry_v2(forces, known, old, blocks, new, bend, work):  # type: ignore[no-un
         The variable of the leg for that.
     blocks, new
         The same for the rows to be filled.
-    bend : float
+    vanishing : int
         As in `whole_rows.fill_v2`.
     work : array
     """
@@ -286,21 +322,23 @@ def carry_v2(forces, known, old, blocks, new, bend, work):  # type: ignore[no-un
         return False
     terms = terms_buffer()
     for at in range(0, known * WIDE, WIDE):
-        factor_of_v2_row(work, known * W + at, known * W + at, known * NODES + at, bend)
+        factor_of_v2_row(work, known * W + at, known * W + at, known * vanishing + at)
     to_coefficients(known, work, known * W, terms, 0)
     begin_leg(blocks, work)
     to_nodes(blocks, work, 0, work, blocks * D)
     for at in range(0, blocks * WIDE, WIDE):
         # Clenshaw's recurrence at the places in [-1, 1] that belong to the new nodes.
-        twice_x, one, other, shares = blocks * D + at, blocks * MEAN + at, blocks * SPEED + at, blocks * NODES + at
+        twice_x, one, other, factor = blocks * D + at, blocks * MEAN + at, blocks * SPEED + at, blocks * vanishing + at
         if new.extent != old.extent:
-            shares = blocks * EXPM1_Q + at
+            factor = shares = blocks * EXPM1_Q + at
             grown_row(work, shares, blocks * NODES + at, new.extent)
             stretched_row(work, shares, shares, new.rising, new.falling)
             product(work, shares, shares, 1.0 / new.width)
             copy_row(work, twice_x, shares)
-            if work[VARIABLE] == IN_PHASE:
-                fill_phases(work, twice_x, shares)
+            if work[GRADE] > IN_SHARE:
+                fill_variable(work, twice_x, shares)
+            if vanishing == BETWEEN_TURNS:
+                product_row(work, factor, shares)
         linear_row(work, twice_x, twice_x, -2.0, 4.0)
         copy_row(work, one, 0.0)
         copy_row(work, other, 0.0)
@@ -308,7 +346,7 @@ def carry_v2(forces, known, old, blocks, new, bend, work):  # type: ignore[no-un
             next_sum_row(work, other, twice_x, one, other, terms[k])
             next_sum_row(work, one, twice_x, other, one, terms[k - 1])
         last_sum_row(work, twice_x, twice_x, one, other, terms[0])
-        v2_row(work, blocks * W + at, twice_x, shares, 1.0, bend)
+        v2_row(work, blocks * W + at, twice_x, factor, 1.0)
         size_row(work, blocks * W + at, blocks * W + at)
     keep_positive(blocks, work)
     return True

@@ -53,7 +53,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     panel_buffer,
     set_nodes,
 )
-from gqm_sym.runtime.legs.panels.point import point_buffer
+from gqm_sym.runtime.legs.panels.point import SMOOTH_AT_REST, law_at_rest, point_buffer
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, to_coefficients
 from gqm_sym.runtime.legs.panels.widest import (
     ALWAYS,
@@ -76,7 +76,6 @@ from gqm_sym.runtime.legs.runs.ends import (
 from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint
 from gqm_sym.runtime.legs.runs.route import RunStart
 from gqm_sym.runtime.legs.runs.run import run
-from gqm_sym.runtime.legs.runs.turn_ahead import slope_if_singular
 from gqm_sym.runtime.legs.runs.whole_leg import run_whole
 
 # The width of the first panel, as a share of a leg of known width.
@@ -292,10 +291,10 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
     # Beside joints, curves are not evaluated at the ends of legs, as they are for legs that pass by a branch point.
     branch = start.branch if route.breaks.size == 0 else BranchPoint(0.0, inf)
     width, may_be_whole = start.width, start.v2 == 0.0 and start.blocks > 0
-    slope = slope_if_singular(forces, start.place, start.contact_sign) if may_be_whole else 0.0
-    if may_be_whole and slope >= 0.0:
+    rest = law_at_rest(forces, start.place, start.contact_sign) if may_be_whole else SMOOTH_AT_REST
+    if may_be_whole and rest.slope >= 0.0:
         if route.reading.what == PASSAGE and not passes_kinks(start):
-            end, blocks, branch = run_to_target(forces, start, branch, slope, route, off, record)
+            end, blocks, branch = run_to_target(forces, start, branch, rest, route, off, record)
             if end.what == END_PAUSE:
                 return end, blocks, branch
         if passes_breaks(start, start.width, route):
@@ -306,7 +305,7 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
             if end.what != END_TURN or passes_breaks(start, width, route):
                 return end, 0, branch
         if not passes_kinks(start):
-            end, blocks, branch = run_whole(forces, start, branch, slope, route, off, record)
+            end, blocks, branch = run_whole(forces, start, branch, rest, route, off, record)
             if end.what == END_TURN:
                 return end, blocks, branch
             width = 2.0 * end.step

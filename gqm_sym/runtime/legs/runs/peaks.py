@@ -4,7 +4,7 @@ On a leg with a stretched variable (`leg_variable`), the contact force is resolv
 it is largest, because its singularities stay branches there. The law gives it at this place.
 """
 
-from math import cos, fabs, inf, nan, pi, sin, sqrt
+from math import cos, fabs, inf, nan, sin, sqrt
 from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
@@ -39,7 +39,16 @@ from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, WIDE, sum_and_slope
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable
 from gqm_sym.runtime.legs.runs.whole_rows import LEBESGUE, LOCATED_RATIO
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, blocks_of, to_coefficients, to_nodes
+from gqm_sym.runtime.legs.runs.whole_tables import (
+    IN_SHARE,
+    MAX_BLOCKS,
+    blocks_of,
+    grade_of,
+    phase_at,
+    to_coefficients,
+    to_nodes,
+    variable_at,
+)
 
 # Buffers for values at nodes of a panel or leg, their series and the nodes; and for a series.
 sample_buffer, speed_buffer = on_stack(3 * MAX_BLOCKS * WIDE), on_stack(MAX_BLOCKS * WIDE)
@@ -215,7 +224,8 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
 def place_in_rows(record, time):  # type: ignore[no-untyped-def]
     """Return the place in [-1, 1] at a time from the start of a leg whose record has rows, to some ten digits."""
     phase, backwards = phase_of_rows(record, record[HEAD:], time)
-    x = 2.0 / pi * phase - 1.0 if int(record[WHOLE]) > MAX_BLOCKS else -cos(phase)
+    grade = grade_of(int(record[WHOLE]))
+    x = 2.0 * variable_at(grade, phase) - 1.0 if grade > IN_SHARE else -cos(phase)
     return -x if backwards else x
 
 
@@ -243,8 +253,8 @@ def force_at(forces, stretch, form, v2, x):  # type: ignore[no-untyped-def]
     (start, end, v, variable), point, speeds, blocks = stretch, point_buffer(), speed_buffer(), blocks_of(form)
     to_coefficients(blocks, v2, 0, speeds, 0)
     share = 0.5 * (1.0 - fabs(x))
-    if form > MAX_BLOCKS:
-        share = sin(0.5 * pi * share) ** 2
+    if grade_of(form) > IN_SHARE:
+        share = sin(0.5 * phase_at(grade_of(form), share)) ** 2
     if x <= 0.0:
         place = start[0] + (start[1] + v * distance_at(variable, share))
     else:

@@ -10,15 +10,12 @@ from math import exp, fabs, inf, nan, sqrt
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.panels.breaks import place_after, within
 from gqm_sym.runtime.legs.panels.equation import FORCE, LOAD, March, P, Panel, W, marched
-from gqm_sym.runtime.legs.panels.point import LEAST_V2, ZERO_TOLERANCE, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, ZERO_TOLERANCE, law_at_rest, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT
 from gqm_sym.runtime.legs.panels.resolution import examine, first_change_of, set_sizes, size_at
 from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_panel
 from gqm_sym.runtime.legs.panels.widest import ALWAYS, PanelRequest, are_all_resolved, next_panel
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, end_at_once
-
-# The derivative of a law with respect to V**2, at V**2 = `LEAST_V2`, above which it is taken to be infinite at rest.
-LEAST_DERIVATIVE = 1e100
 
 # The largest number of distances that are tried, and the step as a share of the distance after which the next one would
 # be rounding only.
@@ -29,27 +26,9 @@ MAX_NOISE = 1e-12
 
 
 @Inner
-def slope_if_singular(forces, place, contact_sign):  # type: ignore[no-untyped-def]
-    """Return the increase of V**2 with the distance for a body at rest, if the derivative of the law with respect to
-    V**2 is infinite there; otherwise 0.
-    """
-    if forces.linear or forces.squared_contact != 0:
-        return 0.0
-    point = point_buffer()
-    slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
-    return slope if fabs(point[4]) > LEAST_DERIVATIVE else 0.0
-
-
-@Inner
 def ends_at_turn(forces, place, contact_sign):  # type: ignore[no-untyped-def]
-    """Return whether the law is infinitely steep at rest, or has no values for V**2 < 0 because it contains a root of
-    V**2, if only with the coefficient 0: then no panel goes beyond a turn.
-    """
-    if forces.linear or forces.squared_contact != 0:
-        return False
-    point = point_buffer()
-    beyond = slope_of_v2(forces, place, -LEAST_V2, contact_sign, point)
-    return beyond != beyond or slope_if_singular(forces, place, contact_sign) != 0.0
+    """Return whether a law contains roots of V**2, if only with the coefficient 0: no panel goes beyond a turn then."""
+    return law_at_rest(forces, place, contact_sign).grade > 0
 
 
 @Inner

@@ -7,6 +7,8 @@ exp(q) P (`panels.equation`) from the nearer turn, so that nothing is subtracted
 over the whole leg vanishes; Newton's method finds it. Where branch points of ds are near, y is another variable, and
 ds, P and Q are those with respect to it (`leg_variable`).
 
+If the law contains roots of V**2, y is as the square or the fourth power of the variable at turns (`whole_tables`).
+
 The polynomial has 23 nodes, or 47 or 71 where those resolve a leg that fewer do not (`whole_tables`). It has at most 47
 where the time at a place is read, because with more nodes that takes longer than panels that are laid one by one. For a
 solved motion the record gets rows from which panels are made when they are needed (`whole_panels`).
@@ -19,7 +21,7 @@ import numpy as np
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.kinks.curvature import curvature_sign
-from gqm_sym.runtime.legs.kinks.places import note_kinks, note_place
+from gqm_sym.runtime.legs.kinks.places import note_kinks
 from gqm_sym.runtime.legs.leg_record import (
     EXTENT,
     FALLING,
@@ -52,23 +54,23 @@ from gqm_sym.runtime.legs.panels.equation import (
     copy,
     load_per_mass_row,
 )
-from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
+from gqm_sym.runtime.legs.panels.point import LawAtRest, point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
-from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
+from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE, NOISE_LEVEL
 from gqm_sym.runtime.legs.panels.solving import is_settled
 from gqm_sym.runtime.legs.runs.branch_points import (
     NOT_TRIED,
     Attempt,
-    branch_of_turning,
     carry_v2,
     first_attempt,
-    is_bent_by_turning,
     next_attempt,
+    note_branch_of_turning,
 )
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
 from gqm_sym.runtime.legs.runs.leg_variable import distance_at, lengthened, unstretched
 from gqm_sym.runtime.legs.runs.whole_rows import (
     BETWEEN_TURNS,
+    GRADE,
     HAS_KINKS,
     NO_KINKS,
     are_rows_resolved,
@@ -89,6 +91,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
 )
 from gqm_sym.runtime.legs.runs.whole_tables import (
     MAX_BLOCKS,
+    MAX_GRADE,
     to_coefficients,
     to_end_terms,
     to_half_times,
@@ -254,26 +257,6 @@ def is_whole(forces, march, panel, blocks, variable, reading, kinks, work):  # t
 
 
 @Inner
-def note_branch_of_turning(forces, march, panel, blocks, variable, kinks, work):  # type: ignore[no-untyped-def]
-    """Note the place beside a leg over which the turning rate has a branch point, if that is what the last coefficients
-    of the force are due to; return whether there is one.
-
-    The turning rate of a planar curve has a sign, and no branch points; legs past places where it vanishes are those
-    past kinks.
-    """
-    if forces.squared_contact == 0 or not forces.linear or kinks.size == 1 or kinks[0] < 0.0:
-        return False
-    if not (sample_leg(forces, march, panel, blocks, variable, work) and is_bent_by_turning(blocks, work)):
-        return False
-    begin_leg(1, work)
-    h = variable.width
-    if not sample_leg(forces, march, panel, 1, unstretched(h), work):
-        return False
-    place = branch_of_turning(march, h, work)
-    return place == place and note_place(place, kinks)
-
-
-@Inner
 def first_width(start):  # type: ignore[no-untyped-def]
     """Return the first width to try."""
     return start.width if start.width > 0.0 else FIRST_WIDTH * start.step
@@ -282,7 +265,7 @@ def first_width(start):  # type: ignore[no-untyped-def]
 @Inner
 def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type: ignore[no-untyped-def]
     """Return the attempt that resolves a leg; it has 0 blocks if there is none."""
-    most = 2 if reading.what == PASSAGE else MAX_BLOCKS
+    most = 2 if reading.what == PASSAGE and work[GRADE] <= 1.0 else MAX_BLOCKS
     attempt = first_attempt(start.blocks, branch, march, first_width(start))
     variable = attempt.variable
     aim = FIND
@@ -363,11 +346,11 @@ def enter_leg(record, route, origin, v, blocks, variable, work):  # type: ignore
 
 
 @Inner
-def run_whole(forces, start, branch, slope_at_rest, route, off, record):  # type: ignore[no-untyped-def]
+def run_whole(forces, start, branch, rest, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from one turn to the next, if that takes one polynomial only.
 
-    The parameters are those of `runs.run.run`; the branch point of ds that the leg may pass by; and the slope of V**2
-    at the start, if the law is infinitely steep there, or else 0.
+    The parameters are those of `runs.run.run`; the branch point of ds that the leg may pass by; and what the law is at
+    rest. Panels cannot be made from rows with the grade 2.
 
     Returns
     -------
@@ -388,9 +371,12 @@ def run_whole(forces, start, branch, slope_at_rest, route, off, record):  # type
         nu = sign_of_load(forces, within(start.place, span), 0.0, point_buffer())
     if nu != 0 and nu != -route.only_sign and record.size >= HEAD + MAX_ROWS * MAX_BLOCKS * WIDE:
         work = whole_buffer()
-        choose_variable(slope_at_rest * first_width(start), work)
-        panel = Panel(0.0, 0.0, nu, span)
-        found = solve_leg(forces, march, panel, room, start, branch, route.reading, work)
+        panel, found = Panel(0.0, 0.0, nu, span), Attempt(0, unstretched(0.0), branch, NOT_TRIED, 1.0)
+        for grade in range(rest.grade, (1 if route.reading.what >= PANELS else MAX_GRADE) + 1):
+            choose_variable(LawAtRest(rest.slope, grade, rest.noise), first_width(start), work)
+            found = solve_leg(forces, march, panel, room, start, branch, route.reading, work)
+            if found.blocks > 0 or rest.noise == NOISE_LEVEL:
+                break
         blocks, variable, branch, h = found.blocks, found.variable, found.branch, found.variable.width
         if blocks > 0:
             enter_leg(record, route, origin, v, blocks, variable, work)

@@ -1,9 +1,9 @@
 """Rows of a leg from turn to turn as one polynomial: how well they are resolved, and whether they keep their sign.
 
 Rows are those of a panel (`panels.equation`) with more nodes: with ``blocks`` blocks of numbers each (`whole_tables`),
-the row ``r`` of a panel begins at ``blocks * r``. They are polynomials in the share of the way; or in the phase angle,
-if the law contains the speed itself, as linear drag does. Both V and the place are smooth in that angle, turns
-included, but V is not smooth in the place there.
+the row ``r`` of a panel begins at ``blocks * r``. They are polynomials in the share of the way; or in another variable,
+if the law contains roots of V**2 (`point.law_at_rest`). Linear drag contains the speed V itself. Both V and the
+place are smooth in the phase angle, turns included, but V is not smooth in the place there.
 """
 
 from math import fabs, inf, log, pi, sqrt
@@ -56,7 +56,6 @@ from gqm_sym.runtime.legs.panels.resolution import (
 )
 from gqm_sym.runtime.legs.runs.leg_variable import lay_places, stretch_law
 from gqm_sym.runtime.legs.runs.whole_tables import (
-    IN_PHASE,
     IN_SHARE,
     MAX_BLOCKS,
     MIDDLE_DEGREES,
@@ -65,6 +64,7 @@ from gqm_sym.runtime.legs.runs.whole_tables import (
     to_mean_rates,
     to_means,
     to_nodes,
+    to_products,
     to_tails,
 )
 
@@ -73,10 +73,14 @@ from gqm_sym.runtime.legs.runs.whole_tables import (
 # log(TAIL_RATIO)/log(LOCATED_RATIO).
 LOCATED_RATIO = 1e-10
 
-# The rows of a panel and of the leg, one after the other; and two numbers behind them: IN_SHARE or IN_PHASE
-# (`whole_tables`), and the number c for which iterations begin with ``V**2 = c y (1 - y)``.
-ROWS = 22
-VARIABLE, FIRST_V2, WORK = range(ROWS * MAX_BLOCKS * WIDE, ROWS * MAX_BLOCKS * WIDE + 3)
+# The row of ``y (1 - y)``, behind those of a panel. It has all its digits at both ends.
+PRODUCTS = NODES + WIDE
+
+# The rows, one after the other; and three numbers behind them: the grade (`whole_tables`), the number c for which
+# iterations begin with ``V**2 = c y (1 - y)``, and the ratio to their size below which coefficients that no longer
+# decrease are rounding noise.
+ROWS = 23
+GRADE, FIRST_V2, NOISE, WORK = range(ROWS * MAX_BLOCKS * WIDE, ROWS * MAX_BLOCKS * WIDE + 4)
 whole_buffer = on_stack(WORK)
 
 # The rows of a module's function `squared_contact`.
@@ -88,12 +92,12 @@ LEBESGUE = 4.0
 slope_row = over_rows(lambda p, q, w, step: step * (p - q * w), WIDE)
 moved_row = over_rows(lambda w, y, slope: w + y * slope, WIDE)
 size_row = over_rows(lambda w: abs(w), WIDE)
-resistance_row = over_rows(lambda q, y, v: 2.0 * v * q * np.sqrt(y - y * y), WIDE)
-v2_row = over_rows(lambda factor, y, h, bend: factor * (h * (y + bend * (y * y))), WIDE)
+resistance_row = over_rows(lambda q, product, v: 2.0 * v * q * np.sqrt(product), WIDE)
+v2_row = over_rows(lambda factor, vanishing, h: factor * (h * vanishing), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
 
-# The factor c of ``W = h (y + c y**2) C`` on a leg between two turns, and on a part of one that begins at a turn.
-BETWEEN_TURNS, FROM_TURN = -1.0, 0.0
+# The row of what W vanishes with, between two turns, and on a part of a leg that begins at a turn.
+BETWEEN_TURNS, FROM_TURN = PRODUCTS, NODES
 
 # The number of blocks to try next on a leg with a kink of the law, and the ends of a leg that are no kinks.
 HAS_KINKS, NO_KINKS = -1, (False, False)
@@ -133,7 +137,7 @@ def examine_row(blocks, work, row, size):  # type: ignore[no-untyped-def]
     to_tails(blocks, work, blocks * row, work, at)
     tail = max(fabs(work[at]), max(fabs(work[at + 1]), fabs(work[at + 2])))
     middle = max(fabs(work[at + 3]), max(fabs(work[at + 4]), fabs(work[at + 5])))
-    return tail, middle, are_fine(tail, middle, size)
+    return tail, middle, are_fine(tail, middle, size, work[NOISE])
 
 
 @Inner
@@ -157,13 +161,13 @@ def keeps_sign(blocks, work, row, sign, noise):  # type: ignore[no-untyped-def]
 @Inlined
 def form_of(blocks, work):  # type: ignore[no-untyped-def]
     """Return the form of rows (`whole_tables`)."""
-    return blocks + int(work[VARIABLE])
+    return blocks + MAX_BLOCKS * int(work[GRADE])
 
 
 @Inner
-def choose_variable(first_v2, work):  # type: ignore[no-untyped-def]
-    """Choose the variable of the rows: the phase angle if V**2 to begin with, FIRST_V2, must not be zero."""
-    work[FIRST_V2], work[VARIABLE] = first_v2, IN_PHASE if first_v2 > 0.0 else IN_SHARE
+def choose_variable(rest, width, work):  # type: ignore[no-untyped-def]
+    """Choose the variable of the rows of a leg of about this width, given `point.LawAtRest`."""
+    work[GRADE], work[FIRST_V2], work[NOISE] = rest.grade, rest.slope * width, rest.noise
 
 
 @Inner
@@ -171,9 +175,10 @@ def begin_leg(blocks, work):  # type: ignore[no-untyped-def]
     """Fill in the nodes, and V**2 to begin with, once for all widths."""
     work[0] = 1.0
     to_nodes(form_of(blocks, work), work, 0, work, blocks * NODES)
+    to_products(form_of(blocks, work), work, 0, work, blocks * PRODUCTS)
     for at in range(0, blocks * WIDE, WIDE):
         copy_row(work, blocks * SPEED + at, 1.0)
-        v2_row(work, blocks * W + at, blocks * SPEED + at, blocks * NODES + at, work[FIRST_V2], BETWEEN_TURNS)
+        v2_row(work, blocks * W + at, blocks * SPEED + at, blocks * PRODUCTS + at, work[FIRST_V2])
     keep_positive(blocks, work)
 
 
@@ -181,7 +186,7 @@ def begin_leg(blocks, work):  # type: ignore[no-untyped-def]
 def keep_positive(blocks, work):  # type: ignore[no-untyped-def]
     """Keep V**2 from being zero at the end of a leg where the law is infinitely steep at rest."""
     last = blocks * W + blocks * WIDE - 1
-    if work[VARIABLE] == IN_PHASE:
+    if work[GRADE] > IN_SHARE:
         work[last] = max(work[last], LEAST_V2)
 
 
@@ -206,8 +211,8 @@ def sample_leg(forces, march, panel, blocks, variable, work):  # type: ignore[no
     if is_stretched:
         stretch_law(blocks, work)
     for at in range(0, wide, WIDE):
-        if work[VARIABLE] == IN_PHASE:
-            resistance_row(work, blocks * Q_RATE + at, blocks * Q + at, blocks * NODES + at, v)
+        if work[GRADE] > IN_SHARE:
+            resistance_row(work, blocks * Q_RATE + at, blocks * Q + at, blocks * PRODUCTS + at, v)
         else:
             product(work, blocks * Q_RATE + at, blocks * Q + at, v)
     # The product with the larger matrices is saved where nothing resists in proportion to V**2.
@@ -241,18 +246,18 @@ def replace_v2(blocks, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_v2(blocks, h, bend, work):  # type: ignore[no-untyped-def]
-    """Fill the rows W_FACTOR and W of a leg between two turns (``bend`` is BETWEEN_TURNS) or of a part that begins at a
-    turn (FROM_TURN); return the largest change of W, and the largest W.
+def fill_v2(blocks, h, vanishing, work):  # type: ignore[no-untyped-def]
+    """Fill the rows W_FACTOR and W of a leg between two turns (``vanishing`` is BETWEEN_TURNS) or of a part that begins
+    at a turn (FROM_TURN); return the largest change of W, and the largest W.
     """
-    if bend == BETWEEN_TURNS:
+    if vanishing == BETWEEN_TURNS:
         to_factors(form_of(blocks, work), work, blocks * FORCE, work, blocks * W_FACTOR)
     else:
         to_means(form_of(blocks, work), work, blocks * FORCE, work, blocks * W_FACTOR)
     for at in range(0, blocks * WIDE, WIDE):
         factor = blocks * W_FACTOR + at
         damped_row(work, factor, factor, blocks * EXPM1_Q + at)
-        v2_row(work, blocks * SPEED + at, factor, blocks * NODES + at, h, bend)
+        v2_row(work, blocks * SPEED + at, factor, blocks * vanishing + at, h)
     return replace_v2(blocks, work)
 
 

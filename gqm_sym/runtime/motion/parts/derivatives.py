@@ -217,7 +217,7 @@ class Derivatives(Positions):
         """Return `sensitivity`, whose contact force is right only if that has a sign."""
         raise self._without_gradients()
 
-    def place_changes(self, t: Any, wrt: Any) -> Array:
+    def place_changes(self, t: Any, wrt: Any = None) -> Array:
         """Return the derivatives of the curve parameter alone, which is faster than `sensitivity`.
 
         Parameters

@@ -15,7 +15,7 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.rider import FIELDS, STANDARD_GRAVITY, check_banked, rider_loads
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.extremes import Extreme, Quantity, extreme
-from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.locking import kept
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 
@@ -38,11 +38,11 @@ def _at(row: int, problem: Problem, timed: TimedSegment, phi: Array, share: floa
 def load_extreme(name: str, sign: int) -> Any:
     """Return a property of motions: the largest (sign 1) or least (-1) value of a load."""
 
-    @locked
     def found(motion: Any) -> Extreme:
         return extreme(motion, load_of(name, motion.problem), sign)
 
-    return property(found, doc=f"The {'largest' if sign > 0 else 'least'} {name} load on a rider; as `v_max`.")
+    found.__name__ = f"n_{name}_{'max' if sign > 0 else 'min'}"
+    return property(kept(found), doc=f"The {'largest' if sign > 0 else 'least'} {name} load on a rider; as `v_max`.")
 
 
 def loads_on_rider(

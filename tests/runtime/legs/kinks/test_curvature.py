@@ -5,6 +5,7 @@ import pytest
 
 from gqm_sym.runtime.legs.kinks.curvature import curvature_sign
 from gqm_sym.runtime.legs.panels.equation import DS, KAPPA
+from gqm_sym.runtime.legs.panels.point import SMOOTH_AT_REST
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.runs.whole_rows import WORK, begin_leg, choose_variable
 from gqm_sym.runtime.legs.runs.whole_tables import nodes
@@ -14,7 +15,7 @@ from gqm_sym.runtime.legs.runs.whole_tables import nodes
 def test_zeros_inside_and_at_the_ends(blocks: int) -> None:
     """A zero inside shows, one at an end is divided out, and a curvature with a close pole is not resolved."""
     y, work = nodes(blocks)[0], np.zeros(WORK)
-    choose_variable(0.0, work)
+    choose_variable(SMOOTH_AT_REST, 0.0, work)
     begin_leg(blocks, work)
     work[blocks * DS : blocks * (DS + WIDE)] = 1.0
     for curvature, kinks, expected in (

@@ -1,6 +1,7 @@
 """Branch points of ds are found from its values on a leg, and V**2 is carried from one attempt to the next."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from mpmath import mp, mpc, mpf
 
 from gqm_sym.runtime.legs.panels.equation import Forces, W
+from gqm_sym.runtime.legs.panels.point import SMOOTH_AT_REST, LawAtRest
 from gqm_sym.runtime.legs.panels.polynomials import SHARES, TO_COEFFICIENTS, WIDE
+from gqm_sym.runtime.legs.panels.resolution import NOISE_LEVEL
 from gqm_sym.runtime.legs.runs.branch_points import BranchPoint, carry_v2, first_guess, zero_of_series
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, unstretched, variable_for
 from gqm_sym.runtime.legs.runs.whole_rows import BETWEEN_TURNS, WORK, begin_leg, choose_variable
@@ -42,14 +45,14 @@ def _carried(
     forces: Forces, old: LegVariable, known: int, new: LegVariable, blocks: int, *, in_phase: bool
 ) -> tuple[bool, Any]:
     """Return whether V**2 = d (2 - d) exp(d/5) is carried to another number of blocks, and its errors there."""
-    shares = phase_nodes if in_phase else nodes
+    shares = partial(phase_nodes, 1) if in_phase else nodes
 
     def v2(variable: LegVariable, blocks: int) -> Any:
         distances = np.array([distance_at(variable, float(y)) for y in shares(blocks)[0]])
         return distances * (2.0 - distances) * np.exp(0.2 * distances)
 
     work = np.zeros(WORK)
-    choose_variable(1.0 if in_phase else 0.0, work)
+    choose_variable(LawAtRest(0.5, 1, NOISE_LEVEL) if in_phase else SMOOTH_AT_REST, 2.0, work)
     begin_leg(known, work)
     work[known * W : known * (W + WIDE)] = v2(old, known)
     is_known = carry_v2(forces, known, old, blocks, new, BETWEEN_TURNS, work)

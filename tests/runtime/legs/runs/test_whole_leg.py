@@ -67,13 +67,16 @@ def test_v2_on_a_wider_leg(blocks: int) -> None:
         assert np.abs(work[row["w"]] - v2(turn * y)).max() <= 4.0 * step * step
 
 
-@pytest.mark.parametrize("blocks", whole_tables.BLOCKS)
-def test_tables_in_phase(blocks: int) -> None:
-    """The tables for nodes in the phase angle integrate exp(-phi/3), which is no polynomial in the share of the way."""
+@pytest.mark.parametrize(("grade", "blocks"), [(1, 1), (1, 2), (1, 3), (2, 2), (2, 3)])
+def test_tables_in_phase(grade: int, blocks: int) -> None:
+    """The tables for nodes in the variable of a grade integrate exp(-phi/3), which is no polynomial in the share of the
+    way.
+    """
     with mp.workdps(30):
         decay = mpf(1) / 3
         x = 2.0 * whole_tables.nodes(blocks)[0, :-1] - 1.0
-        phases = [*((1 + mpf(place)) * mp.pi / 2 for place in x), mp.pi]
+        places = [(1 + mpf(place)) / 2 for place in x]
+        phases = [*(mp.pi * (u if grade == 1 else 3 * u**2 - 2 * u**3) for u in places), mp.pi]
         shares = [mp.sin(phase / 2) ** 2 for phase in phases]
         # The integrals of the function over phi, and times sin(phi).
         plain = [(1 - mp.exp(-decay * phase)) / decay for phase in phases]
@@ -87,15 +90,22 @@ def test_tables_in_phase(blocks: int) -> None:
         rates = [float(area / (2 * share)) for area, share in zip(plain, shares, strict=True)]
         # 1 - y for a force that begins with 1 and ends with -1 is the one with C = 1.
         force = np.array([float(mp.cos(phase)) for phase in phases[:-1]])
+        products = [float(mp.sin(phase) ** 2 / 4) for phase in phases]
     # The nodes of `nodes` are rounded.
-    assert whole_tables.phase_nodes(blocks)[0] == pytest.approx([float(share) for share in shares], abs=TABLE)
-    assert whole_tables.phase_means(blocks).T @ values == pytest.approx(means, abs=TABLE)
-    assert whole_tables.mean_rates(blocks).T @ values == pytest.approx(rates, rel=1e-11)
-    assert whole_tables.phase_half_times(blocks).T @ values == pytest.approx([float(half), float(plain[-1] - half)])
-    assert whole_tables.phase_arrival_time(blocks).T @ values == pytest.approx([float(arrival)], abs=TABLE)
-    assert whole_tables.phase_factors(blocks).T @ force == pytest.approx(np.ones(x.size), abs=TABLE)
-    ends = whole_tables.phase_end_terms(blocks).T @ values
+    assert whole_tables.phase_products(grade, blocks)[0] == pytest.approx(products, abs=TABLE)
+    assert whole_tables.phase_nodes(grade, blocks)[0] == pytest.approx([float(share) for share in shares], abs=TABLE)
+    assert whole_tables.phase_means(grade, blocks).T @ values == pytest.approx(means, abs=TABLE)
+    assert whole_tables.mean_rates(grade, blocks).T @ values == pytest.approx(rates, rel=1e-11)
+    assert whole_tables.phase_half_times(grade, blocks).T @ values == pytest.approx(
+        [float(half), float(plain[-1] - half)]
+    )
+    assert whole_tables.phase_arrival_time(grade, blocks).T @ values == pytest.approx([float(arrival)], abs=TABLE)
+    assert whole_tables.phase_factors(grade, blocks).T @ force == pytest.approx(np.ones(x.size), abs=TABLE)
+    ends = whole_tables.phase_end_terms(grade, blocks).T @ values
     assert ends == pytest.approx([means[-1], float(mp.exp(-mp.pi / 3)), 0.0, 0.0, 0.0, 0.0], abs=4.0 * TABLE * blocks)
+    for u in (1e-9, 0.3, 1.0):
+        phase = whole_tables.phase_at(grade, u)
+        assert whole_tables.variable_at(grade, phase) == pytest.approx(u, rel=4e-16)
 
 
 class Pendulum:
