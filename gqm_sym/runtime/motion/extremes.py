@@ -232,7 +232,7 @@ def _on_segment(
             angle, at_end = near, float(signed(np.array([near]))[0])
             value = value if value - at_end > EQUAL_ROUNDINGS * ULP * size else at_end
         elif quantity is SPEED and low < angle < high:
-            angle, speed = exact_speed(problem, segment, phi, angle, sign)
+            angle, speed = exact_speed(problem, segment, phi, (angle, sign * value), sign)
             value = sign * speed
         at_turn = quantity is SPEED and timed.end == "turn" and angle == timed.phi_stop
         value = 0.0 if at_turn else sign * value

@@ -111,7 +111,7 @@ def fill_rates(integrand, phi, work, out):  # type: ignore[no-untyped-def]
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
             out[0, i] = rows[1, i] / sqrt(2.0 * rows[0, i])
-            out[1, i] = rows[1, i] * fabs((b - a) * s * c)  # the product of both offsets may underflow
+            out[1, i] = rows[1, i] * (sqrt(fabs(da[i])) * sqrt(fabs(db[i])))  # the product of both may underflow
     elif kind == FROM_TURN:
         for i in range(n):
             da[i] = (b - a) * phi[i] * phi[i]

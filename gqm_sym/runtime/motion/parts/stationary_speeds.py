@@ -21,13 +21,15 @@ if TYPE_CHECKING:
 # The steps beside a place at which speeds are compared, as shares of the distance between samples: they are so small
 # that sixth differences of the speeds are roundings. The share of the largest speed that these reach where doubles keep
 # their digits.
-STEPS, MAX_SIXTH_DIFFERENCE = 0.04 * np.arange(-6.0, 7.0), 64.0 * ULP
+STEPS, MAX_SIXTH_DIFFERENCE = 0.04 * np.arange(-6.0, 7.0), 128.0 * ULP
 
 # The number of points of each grid on which a zero of the slope is sought, and of these grids.
 POINTS, GRIDS = 33, 9
 
 
-def exact_speed(problem: "Problem", segment: "Segment", samples: Array, angle: float, sign: int) -> tuple[float, float]:
+def exact_speed(
+    problem: "Problem", segment: "Segment", samples: Array, found: tuple[float, float], sign: int
+) -> tuple[float, float]:
     """Return the phase angle and the speed where it is extreme, as they are in extended precision if doubles have lost
     digits there.
 
@@ -39,16 +41,16 @@ def exact_speed(problem: "Problem", segment: "Segment", samples: Array, angle: f
         A segment of the motion.
     samples : array
         Phase angles in increasing order, between neighbours of which there is at most one extreme.
-    angle : float
-        The phase angle of the extreme in doubles.
+    found : (angle, speed)
+        The same in doubles.
     sign : int
         1 for a largest speed, -1 for a least.
     """
     f, exact, formulas = problem.functions, problem.functions.exact, problem.formulas
-    k = min(max(int(np.searchsorted(samples, angle)), 1), samples.size - 1)
-    near = np.clip(angle + STEPS * (samples[k] - samples[k - 1]), samples[0], samples[-1])
+    k = min(max(int(np.searchsorted(samples, found[0])), 1), samples.size - 1)
+    near = np.clip(found[0] + STEPS * (samples[k] - samples[k - 1]), samples[0], samples[-1])
     speeds = segment.speeds(near)
-    found, noise = (angle, float(segment.speeds(np.array([angle]))[0])), float(np.abs(np.diff(speeds, 6)).max())
+    noise = float(np.abs(np.diff(speeds, 6)).max())
     known = exact is not None and formulas.chart is None and formulas.dissipation is None
     if not known or noise <= MAX_SIXTH_DIFFERENCE * float(speeds.max()):
         return found
