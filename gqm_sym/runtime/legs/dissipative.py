@@ -34,7 +34,7 @@ from gqm_sym.runtime.legs.variations.answers import (
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.at_rest import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg
-from gqm_sym.runtime.motion.locking import computed_once, locked
+from gqm_sym.runtime.motion.locking import computed_once, kept, locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.parts.history import merged
 from gqm_sym.runtime.motion.parts.tabulated import times_from_launch
@@ -103,7 +103,7 @@ class DissipativeMotion(FollowedMotion):
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
     @property
-    @locked
+    @kept
     def legs(self) -> tuple[Leg, ...]:
         """The legs of the motion in the order of time; see `Motion.legs`."""
         self._look_ahead()

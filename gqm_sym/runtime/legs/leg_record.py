@@ -18,7 +18,8 @@ WHOLE                0; or, if the record has no panels but rows of the whole le
                      (`runs.whole_tables`). The rows are, as far as they are read, the coefficients of the
                      time per phase angle, V**2, and N per mass. Where panels are read, they are those of
                      `runs.whole_panels`
-WHOLE_WIDTH          the width of a leg with rows from which panels can be made, or with a stretched variable; else 0
+WHOLE_WIDTH          the width of a leg with rows from which panels can be made, or along which places of extremes are
+                     located; else 0
 RISING, FALLING,     of the variable of a leg with rows (`runs.leg_variable.LegVariable`)
 EXTENT
 AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end; if

@@ -64,7 +64,7 @@ def locked(method: Callable[Concatenate[T, P], R]) -> Callable[Concatenate[T, P]
 
 def kept(method: Callable[[T], R]) -> Callable[[T], R]:
     """Return a method without arguments that runs once for each object, under its lock; its answer is kept."""
-    name = f"_{method.__name__}"
+    name = method.__qualname__  # a method that it overrides has another one
 
     @wraps(method)
     def known_or_found(self: T) -> R:

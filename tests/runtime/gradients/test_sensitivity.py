@@ -164,6 +164,7 @@ def test_shapes_and_names() -> None:
     assert motion.sensitivity(np.zeros((2, 3)), ("g", "L")).x.shape == (2, 2, 3)
     assert motion.sensitivity(np.empty(0), "L").normal_force.shape == (1, 0)
     assert motion.sensitivity("1/2", "L").wrt == ("L",)
+    np.testing.assert_allclose(motion.place_changes(0.5), motion.sensitivity(0.5).lam, rtol=1e-14, atol=1e-15)
     np.testing.assert_allclose(motion.sensitivity(0.0).lam, [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-15)
     with pytest.raises(SolutionError, match="too near to an equilibrium"):
         generated("circle").solve(lam0="pi - 1/10**30").sensitivity(0.5)

@@ -173,3 +173,4 @@ def test_an_answer_is_kept() -> None:
     assert Asked().answer() == [2]
     motion = import_module("generated.circle").solve(1.2)
     assert motion.v_max is motion.v_max
+    assert (motion.legs is motion.legs, motion.events is motion.events) == (True, True)

@@ -65,7 +65,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     size_of_row,
     whole_buffer,
 )
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_arrival_time, to_means
+from gqm_sym.runtime.legs.runs.whole_tables import IN_SHARE, MAX_BLOCKS, to_arrival_time, to_means
 
 # The least ratio of V**2 between two parts to the largest so far. A rounding of the latter has an effect on the time
 # that grows with the root of its inverse.
@@ -331,7 +331,7 @@ def try_next(march, kinks, variable, blocks, branch, ratio, work):  # type: igno
         branch = branch_beside(march, h, work)
         if variable_for(branch, march.origin, march.direction, h).extent > 0.0:
             return 1, branch
-    more = blocks_for(ratio, blocks, variable.extent > 0.0)
+    more = blocks_for(ratio, blocks, variable.extent > 0.0, IN_SHARE)
     for k in range(blocks, more):
         kinks[k] = min(h, kinks[k]) if kinks[k] > 0.0 else h
     if more == 0:

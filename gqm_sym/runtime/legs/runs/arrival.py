@@ -29,6 +29,7 @@ from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
 from gqm_sym.runtime.legs.runs.whole_rows import (
     FROM_TURN,
+    GRADE,
     HAS_KINKS,
     NO_KINKS,
     are_rows_resolved,
@@ -87,14 +88,14 @@ def is_resolved(forces, march, panel, blocks, variable, kinks, work):  # type: i
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, is_kept, load_ratio = load_sign(is_stretched, blocks, panel.contact_sign, work)
     if not (fine and load_fine):
-        return False, blocks_for(max(ratio, load_ratio), blocks, is_stretched), ratio
+        return False, blocks_for(max(ratio, load_ratio), blocks, is_stretched, work[GRADE]), ratio
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
     if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
         return False, 0, 1.0
     if not (curve_fine and bends_one_way):
-        return False, blocks_for(curve_ratio, blocks, is_stretched), curve_ratio
+        return False, blocks_for(curve_ratio, blocks, is_stretched, work[GRADE]), curve_ratio
     fine, ratio = fill_times(blocks, h, work)
-    return fine, blocks_for(ratio, blocks, is_stretched), ratio
+    return fine, blocks_for(ratio, blocks, is_stretched, work[GRADE]), ratio
 
 
 @Inner

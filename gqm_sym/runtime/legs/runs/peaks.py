@@ -324,7 +324,7 @@ def peak_of_rows(forces, record, until, asked, best):  # type: ignore[no-untyped
     for at in range(0, blocks * WIDE, WIDE):
         copy(values, at, record, HEAD + (1 if function == SPEED else 2) * blocks * WIDE + at)
     last = 1.0 if until >= record[TIME_FROM_START] + record[TIME_FROM_END] else place_in_rows(record, max(until, 0.0))
-    if function == LOAD and record[EXTENT] > 0.0:
+    if function == LOAD and (record[EXTENT] > 0.0 or grade_of(form) > 1):
         ends = (record[START], record[START_LOW]), (record[END], record[END_LOW])
         stretch = Stretch(*ends, record[HEADING], variable_of_rows(record, record[WHOLE_WIDTH]))
         return peak_of_force(forces, stretch, form, values, record[HEAD + blocks * WIDE :], last, sign, best)

@@ -248,12 +248,12 @@ def is_whole(forces, march, panel, blocks, variable, reading, kinks, work):  # t
     if load_fine and reading.what == PEAKS and reading.force:
         load_fine, load_ratio = is_contact_force_resolved(forces, reading.length, is_stretched, blocks, work)
     if not (fine and load_fine and curve_fine):
-        return False, blocks_for(max(ratio, curve_ratio, load_ratio), blocks, is_stretched), ratio
+        return False, blocks_for(max(ratio, curve_ratio, load_ratio), blocks, is_stretched, work[GRADE]), ratio
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
     if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
         return False, 0, 1.0
     fine, ratio = fill_times(blocks, h, work)
-    return fine, blocks_for(ratio, blocks, is_stretched), ratio
+    return fine, blocks_for(ratio, blocks, is_stretched, work[GRADE]), ratio
 
 
 @Inner
@@ -285,7 +285,7 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
             if fine:
                 aim = CHECK
                 continue
-            onwards = blocks_for(ratio, 1, variable.extent > 0.0)
+            onwards = blocks_for(ratio, 1, variable.extent > 0.0, work[GRADE])
         else:
             fine, onwards, ratio = is_whole(forces, march, panel, blocks, variable, reading, start.kinks, work)
         attempt = Attempt(blocks, variable, attempt.branch, attempt.plain_blocks, attempt.plain_ratio)
@@ -339,7 +339,8 @@ def enter_leg(record, route, origin, v, blocks, variable, work):  # type: ignore
     to_half_times(form_of(blocks, work), work, blocks * TIME_RATE, work, blocks * TAILS)
     first, second = work[blocks * TAILS], work[blocks * TAILS + 1]
     enter_rows(record, blocks, route, is_read(route, origin, v, h, first + second), work)
-    is_wanted = route.reading.what >= PANELS or (route.reading.what == PEAKS and variable.extent > 0.0)
+    is_located = variable.extent > 0.0 or work[GRADE] > 1.0
+    is_wanted = route.reading.what >= PANELS or (route.reading.what == PEAKS and is_located)
     record[WHOLE_WIDTH] = h if is_wanted else 0.0
     record[RISING], record[FALLING], record[EXTENT] = variable.rising, variable.falling, variable.extent
     record[TIME_FROM_START], record[TIME_FROM_END] = first, second

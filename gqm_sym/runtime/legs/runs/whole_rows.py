@@ -350,7 +350,8 @@ def is_contact_force_resolved(forces, is_length, is_stretched, blocks, work):  #
     """Return whether N itself is resolved, as its extremes require, and the ratio of its middle coefficients.
 
     If it is a length, that is its square, which is smooth also where it almost vanishes; the rows N0 and KAPPA become
-    the length and 0. On a leg whose variable is stretched its extremes need only be located (`peaks`).
+    the length and 0. On a leg whose variable is stretched, or that has the grade 2, its extremes need only be located
+    (`peaks`).
     """
     if is_length:
         fill_lengths(forces, blocks, work)
@@ -361,7 +362,7 @@ def is_contact_force_resolved(forces, is_length, is_stretched, blocks, work):  #
             product(work, blocks * SERIES + at, n0, n0)
     size = size_of_row(blocks, work, SERIES)
     tail, middle, fine = examine_row(blocks, work, SERIES, size)
-    if is_stretched and not is_length:
+    if (is_stretched or work[GRADE] > 1.0) and not is_length:
         fine, middle = tail <= LOCATED_RATIO * size, middle * sqrt(middle / size)
     return fine, middle / size
 
@@ -389,12 +390,13 @@ def fill_times(blocks, h, work):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def blocks_for(ratio, blocks, is_stretched):  # type: ignore[no-untyped-def]
+def blocks_for(ratio, blocks, is_stretched, grade):  # type: ignore[no-untyped-def]
     """Return the number of blocks that resolve a function whose middle coefficients have this ratio to its size with
-    fewer ``blocks``; 0 if there is no such number, as for the ratio 1. In a stretched variable there are no roots near.
+    fewer ``blocks``; 0 if there is no such number, as for the ratio 1. In a stretched variable there are no roots near,
+    and with the ``grade`` 2 coefficients decrease slowly at first.
     """
     if not 0.0 < ratio < 1.0:
         return 0
     nodes = MIDDLE_DEGREES[blocks - 1] * log(TAIL_RATIO) / log(ratio)
     needed = max(int(nodes / ((1.0 if is_stretched else ENOUGH_NODES) * WIDE)) + 1, blocks + 1)
-    return needed if needed <= MAX_BLOCKS else 0
+    return needed if needed <= MAX_BLOCKS else (MAX_BLOCKS if grade > 1.0 and blocks < MAX_BLOCKS else 0)

@@ -12,7 +12,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import Pair
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.events import Event, Leg, contact_changes, corner_crossings, crossings
-from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.locking import kept, locked
 from gqm_sym.runtime.motion.parts.positions import Positions
 from gqm_sym.runtime.motion.rolling import slip_times
 from gqm_sym.runtime.motion.rows import Rows
@@ -28,7 +28,7 @@ class History(Positions):
         return ("",)
 
     @property
-    @locked
+    @kept
     def legs(self) -> tuple[Leg, ...]:
         """The legs of the motion in the order of time, over one period from launch if it is periodic.
 
@@ -62,7 +62,7 @@ class History(Positions):
         return lam
 
     @property
-    @locked
+    @kept
     def events(self) -> tuple[Event, ...]:
         """The events of the motion in the order of time, over one period from launch if it is periodic.
 

@@ -41,7 +41,7 @@ def load_extreme(name: str, sign: int) -> Any:
     def found(motion: Any) -> Extreme:
         return extreme(motion, load_of(name, motion.problem), sign)
 
-    found.__name__ = f"n_{name}_{'max' if sign > 0 else 'min'}"
+    found.__qualname__ = f"n_{name}_{'max' if sign > 0 else 'min'}"
     return property(kept(found), doc=f"The {'largest' if sign > 0 else 'least'} {name} load on a rider; as `v_max`.")
 
 

@@ -123,3 +123,13 @@ def test_roots_of_v2(power: str, k: float, start: float, build: Build) -> None:
     places = [0.5 * start, -0.7 * start]
     found = module.sweep("time_at", [start, start], lam=places, k=k).values
     assert found == pytest.approx([float(t) for t in passages], rel=2e-15)
+
+
+def test_the_largest_force_of_a_law_with_fourth_roots(build: Build) -> None:
+    """On an ellipse the contact force needs more nodes than the motion; its extreme, found as above in 40 digits, is
+    right to the last place.
+    """
+    ellipse = gqm.Curve.parametric(x="2*cos(u)", z="sin(u)", parameter="u", period="2*pi")
+    module = build("power_on_an_ellipse", ellipse, gqm.Kernel.law("-direction*k*W**(3/4)"))
+    found = module.sweep("normal_force_max", [-0.9], t_max=4.0, k=0.1)
+    assert found.values == pytest.approx([10.750304633696166883], rel=5e-16)
