@@ -242,7 +242,8 @@ def test_the_smallest_swings(size: float, module_of: Callable[[str], ModuleType]
 
 def test_speeds_whose_square_is_beyond_doubles(module_of: Callable[[str], ModuleType]) -> None:
     """Such a launch is refused, and there is no largest speed of a motion that reaches no other, in a sweep neither.
-    The speed had fewer digits or was 0, a throw counted as rest, and sweeps and motions differed.
+    The speed had fewer digits or was 0, a throw counted as rest, and sweeps and motions differed. The half period and
+    the contact force of a swing of 1e-158 took 20 seconds, because the speed was the root of a product that underflows.
     """
     circle = module_of("circle")
     speeds = [1e-149, 1e-155, 1e-170]
@@ -256,6 +257,9 @@ def test_speeds_whose_square_is_beyond_doubles(module_of: Callable[[str], Module
             _ = slow.v_max
         assert slow.v_min == (0.0, 0.0, size)
         assert "_in_multiprecision" not in vars(slow)
+        assert slow.normal_force_max.value == slow.normal_force_min.value == 9.81
+        assert slow.half_period == pytest.approx(math.pi / math.sqrt(9.81), rel=1e-15)
+        assert slow.state(0.25 * slow.period).v == pytest.approx(-math.sqrt(9.81) * size, rel=1e-13, abs=0.0)
 
 
 @pytest.mark.parametrize("v0", [1e-2, 1e-5, 1e-7, 1e-10])

@@ -281,7 +281,9 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
     what, near, far = found
     if what == zeros.TURN:
         return EndOfMotion("turn", lam0 + near, offset=near)
-    if what == zeros.STEPS_SPENT and isfinite(length) and not _speed_overflows(problem, near):
+    # On an endless curve a search that goes far shows that the body does too, unless its first step was too wide.
+    goes_far = not isfinite(length) and abs(near) >= step
+    if what == zeros.STEPS_SPENT and not goes_far and not _speed_overflows(problem, near):
         raise _too_many_barriers(problem)
     if what == zeros.LIMIT and period:
         return EndOfMotion("closed", lam0 + direction * period)

@@ -16,6 +16,7 @@ from gqm_sym.runtime.motion.parts.before_joint import loss_at_joint
 from gqm_sym.runtime.motion.parts.beside_cusp import force_beside_cusp
 from gqm_sym.runtime.motion.parts.peaks import peak_between
 from gqm_sym.runtime.motion.parts.searched import EQUAL_ROUNDINGS, samples, size_of, trajectory_with_extreme
+from gqm_sym.runtime.motion.parts.stationary_speeds import exact_speed
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
@@ -230,6 +231,9 @@ def _on_segment(
         if abs(near - angle) < END_SHARE * (high - low):
             angle, at_end = near, float(signed(np.array([near]))[0])
             value = value if value - at_end > EQUAL_ROUNDINGS * ULP * size else at_end
+        elif quantity is SPEED and low < angle < high:
+            angle, speed = exact_speed(problem, segment, phi, (angle, sign * value), sign)
+            value = sign * speed
         at_turn = quantity is SPEED and timed.end == "turn" and angle == timed.phi_stop
         value = 0.0 if at_turn else sign * value
         found.append(_extreme_at(timed, trajectory, angle, value))

@@ -111,7 +111,7 @@ def fill_rates(integrand, phi, work, out):  # type: ignore[no-untyped-def]
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
             out[0, i] = rows[1, i] / sqrt(2.0 * rows[0, i])
-            out[1, i] = rows[1, i] * sqrt(da[i] * db[i])
+            out[1, i] = rows[1, i] * (sqrt(fabs(da[i])) * sqrt(fabs(db[i])))  # the product of both may underflow
     elif kind == FROM_TURN:
         for i in range(n):
             da[i] = (b - a) * phi[i] * phi[i]
@@ -155,7 +155,7 @@ def fill_speeds(integrand, phi, work, out):  # type: ignore[no-untyped-def]
             db[i] = (b - a) * c * c
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            out[i] = sqrt(2.0 * da[i] * db[i] * rows[0, i])
+            out[i] = sqrt(fabs(da[i])) * sqrt(2.0 * fabs(db[i]) * rows[0, i])  # the product of both may underflow
     elif kind == TO_EQUILIBRIUM:
         for i in range(n):
             da[i] = (a - b) * exp(-phi[i])

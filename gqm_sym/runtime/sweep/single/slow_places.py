@@ -37,8 +37,9 @@ MIN_V2_SHARE = 1e-9
 
 # The share of V**2 at launch below which V**2 elsewhere, as its difference from that, has lost digits; and the half
 # width of the interval in which an equilibrium is sought where V**2 is smallest or largest, as a share of the orbit's
-# width.
+# width. In flat wells whose terms cancel that place is rough, and the interval is widened so many times by a factor.
 MIN_SHARE_OF_LAUNCH, EQUILIBRIUM_SHARE = 0.25, 1e-5
+WIDENINGS, WIDENED = 3, 16.0
 
 # The largest number of parts of an orbit, and the number of times that the interval of the grid in which V**2 is
 # smallest is halved.
@@ -91,11 +92,11 @@ def slope_at(curve, place):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def hilltop_between(curve, low, high):  # type: ignore[no-untyped-def]
-    """Return the place between two others at which the potential stops rising."""
+def equilibrium_between(curve, low, high, before):  # type: ignore[no-untyped-def]
+    """Return the place between two others at which the slope of the potential no longer has the sign of ``before``."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if slope_at(curve, middle) > 0.0:
+        if slope_at(curve, middle) * before > 0.0:
             low = middle
         else:
             high = middle
@@ -117,12 +118,18 @@ def exact_extreme_speed(curve, orbit, value, share):  # type: ignore[no-untyped-
         return value if value * value >= MIN_SHARE_OF_LAUNCH * orbit.v2 else nan
     width = orbit.high - orbit.low
     place, low_part = two_sum(orbit.lam0, orbit.low + width * share)
-    reach = EQUILIBRIUM_SHARE * width
+    reach, within = EQUILIBRIUM_SHARE * width, min(share, 1.0 - share) * width
     before, after = slope_at(curve, place - reach), slope_at(curve, place + reach)
-    if before > 0.0 and after < 0.0:
-        place, low_part = hilltop_between(curve, place - reach, place + reach), 0.0
-    elif before < 0.0 and after > 0.0:  # at the bottom of a well V**2 is large, and one step of the secant method does
+    for _ in range(WIDENINGS):
+        if before * after <= 0.0 or WIDENED * reach > within:
+            break
+        reach *= WIDENED
+        before, after = slope_at(curve, place - reach), slope_at(curve, place + reach)
+    if before < 0.0 and after > 0.0 and reach == EQUILIBRIUM_SHARE * width:
+        # At the bottom of a well V**2 is large, and one step of the secant method does.
         place, low_part = place - reach * (after + before) / (after - before), 0.0
+    elif before * after < 0.0:
+        place, low_part = equilibrium_between(curve, place - reach, place + reach, before), 0.0
     places, v2, slopes = place_buffer(), place_buffer(), place_buffer()
     places[0] = place
     fill_exactly(curve, orbit.lam0, places, 1, v2, slopes)
@@ -190,7 +197,7 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
         if 0 < i < last:
             width = end - begin
             low, high = lam0 + (begin + width * WIDTH_SHARES[i - 1]), lam0 + (begin + width * WIDTH_SHARES[i + 1])
-            place = hilltop_between(curve, low, high)
+            place = equilibrium_between(curve, low, high, 1.0)
         places[count] = place
         cuts[count] = first if count == 0 else lam0 + (begin + (end - begin) * WIDTH_SHARES[at_peak])
         peak, count = v2[i], count + 1
