@@ -10,9 +10,11 @@ from mpmath import mp, mpf
 from naive import pendulum_half_period, ulps
 from textbook import DIGITS, Textbook
 
+import generated.circle_drag
 import generated.parabola_rolling
 import gqm_sym as gqm
 from gqm_sym.errors import LaunchError, SolutionError
+from gqm_sym.runtime.sweep import quantities
 
 ROUNDINGS = 8 * 2.0**-53
 # Times are the nearest doubles. Worst measured: 0.46.
@@ -329,3 +331,36 @@ def test_sweeps_refuse_a_radius_on_a_track_with_corners_too(tmp_path: Path) -> N
         swept = module.sweep(quantity, [0.3, np.nan, 99.0])
         assert np.isnan(swept.values).all()
         assert swept.status.tolist() == [6, 3, 4]
+
+
+def test_swept_balls_with_drag_in_a_bowl(generated_folder: Path) -> None:
+    """They move like bodies that slide along the path of the centre, with gravity and drag divided by 1 + beta."""
+    force = gqm.Gravity() + gqm.Rolling(radius="rho") + gqm.QuadraticDrag()
+    module = gqm.build(gqm.derive(gqm.families.circle(), force), name="ball_with_drag", folder=generated_folder)
+    angles, beta, b = np.linspace(0.1, 3.0, 30), 0.25, 0.0625
+    given = {"L": 1.5, "rho": 0.5, "beta": beta, "b": b, "t_max": 10}
+    for quantity in ("t_end", "v_max", "v_min"):
+        swept = module.sweep(quantity, angles, 0.0, **given)
+        assert (swept.route == quantities.SINGLE).all()
+        sliding = generated.circle_drag.sweep(
+            quantity, angles, 0.0, L=1, b=b / (1 + beta), g=9.81 / (1 + beta), t_max=10
+        )
+        assert swept.values == pytest.approx(sliding.values, rel=4 * ROUNDINGS, abs=0)
+    assert np.isnan(module.sweep("v_max", angles, 0.0, **{**given, "rho": 1.5}).values).all()
+
+
+def test_rails_narrower_than_a_ball_with_drag(generated_folder: Path) -> None:
+    """A ball that rolls from a line onto an arc of a smaller radius than its own was followed along the arc."""
+    line, arc = gqm.line, gqm.arc
+    rail = gqm.Curve.piecewise(
+        [line(length=1), arc(radius=3, angle="pi/2"), line(length=4)], start=(-5, 4), heading="-pi/2"
+    )
+    force = gqm.Gravity() + gqm.Rolling(radius="rho") + gqm.QuadraticDrag()
+    module = gqm.build(gqm.derive(rail, force), name="ball_on_a_rail", folder=generated_folder)
+    given = {"beta": 0.4, "b": 0.05, "t_max": 8}
+    assert module.solve(0.3, rho=2.9, **given).legs[0].lam_end > 1
+    with pytest.raises(SolutionError, match=r"this rho a body does not fit .* s = 1\.0, where it comes; give rho"):
+        module.solve(0.3, rho=3.5, **given)
+    assert module.solve(0.3, rho=3.5, **{**given, "t_max": 0.1}).legs[0].lam_end < 1
+    swept = module.sweep("v_max", [0.3, 2.0], 0.0, rho=3.5, **given)
+    assert np.isnan(swept.values).all()

@@ -58,6 +58,7 @@ from gqm_sym.runtime.legs.questions import (
     at_rest,
     conclude,
     conclude_at_rest,
+    fits,
     force_is_unbounded,
     goes_on,
     has_passed,
@@ -268,6 +269,8 @@ def drive(dissipation, parameters, row, joints, question, bodies, records):  # t
             what = follow_legs(dissipation, p, joints, bodies, records) if body[DIRECTION] != 0.0 else END_REST
         elif question == RUN_AGAIN:
             what = advance(dissipation, p, joints, body, Reading(PANELS, False, False, 1.0, -inf), records[0])
+        elif not fits(dissipation, p, body):
+            body[VALUE], body[STATUS] = np.nan, LEFT
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, records[0])
         else:

@@ -220,6 +220,14 @@ def after_leg(dissipation, p, body, question, findings, record):  # type: ignore
 
 
 @Inner
+def fits(dissipation, p, body):  # type: ignore[no-untyped-def]
+    """Return whether a rolling body fits into its track at the launch: ds/dlam is negative where it does not."""
+    point = point_buffer()
+    slope_of_v2(forces_on(dissipation, p, 1), body[LAM0], body[V2], 0, point)
+    return point[2] > 0.0
+
+
+@Inner
 def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
     """Return the answer for a body that stays where it is, or that the track would have to pull there at once, and its
     status.

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.launch.problem import Problem
 
 
+# The distance from a joint at which its sides are told apart, in roundings of places along the curve.
+ROUNDINGS_BESIDE = 2.0**12
+
+
 def slip_times(problem: "Problem", timed: TimedSegment, time_scale_error: float) -> list[tuple[Pair, float]]:
     """Return the times at which a rolling body begins to slip on a timed segment, each with its phase angle.
 
@@ -63,6 +67,31 @@ def check_launch(formulas: "Formulas", f: BoundFunctions, lam0: float) -> None:
     ds = path_and_force_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[2, 0]
     if not ds > 0.0:
         raise LaunchError(f"lam0: {_what(formulas, lam0)}; launch elsewhere, or {_remedy(formulas)}")
+
+
+def narrow_joints(f: BoundFunctions) -> Array:
+    """Return the joints of a charted curve's pieces next to which the body does not fit into the track."""
+    joints = f.breaks
+    if not joints.size:
+        return joints
+    beside = ROUNDINGS_BESIDE * np.spacing(np.abs(joints).max())
+    places = np.concatenate([joints - beside, joints + beside])
+    ds = path_and_force_at(f.addresses, f.p, places, np.zeros(places.size))[2].reshape(2, -1)
+    narrow: Array = joints[~(ds > 0.0).all(axis=0)]
+    return narrow
+
+
+def check_joints(formulas: "Formulas", f: BoundFunctions, legs: Sequence[Leg]) -> None:
+    """Refuse a motion with losses past a joint behind which the track is too narrow for the body.
+
+    On curves with formulas the path of the body's centre has a cusp there, at which the motion ends.
+    """
+    narrow = narrow_joints(f)
+    for leg in legs if narrow.size else ():
+        passed = narrow[(narrow > min(leg.lam_start, leg.lam_end)) & (narrow < max(leg.lam_start, leg.lam_end))]
+        if passed.size:
+            first = passed[np.argmin(np.abs(passed - leg.lam_start))]
+            raise SolutionError(f"{_what(formulas, float(first))}, where it comes; {_remedy(formulas)}")
 
 
 def check_end(formulas: "Formulas", legs: Sequence[Leg]) -> None:

@@ -50,6 +50,11 @@ QUESTIONS = {
     "normal_force_max": questions.MOST_LOAD,
 }
 
+# The quantities of rolling bodies on curves with formulas. For others `solve` follows the bodies to the end, since they
+# may come to where they do not fit into the track; and panels do not resolve the contact force where the path of the
+# centre is narrowly bent. Along charts a track may be too narrow behind a joint, which only `solve` checks.
+OF_ROLLING_BODIES = ("t_end", "rest_position", "v_min", "v_max")
+
 
 class Question(NamedTuple):
     """The question for all bodies.
@@ -94,9 +99,11 @@ def is_length_known(formulas: "Formulas") -> bool:
 def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Question | None:
     """Return the question to compiled code for a quantity; None if motions must be solved, or no energy is lost."""
     loss = formulas.dissipation
-    if loss is None or formulas.rolling_radius or quantity not in QUESTIONS:
+    if loss is None or quantity not in QUESTIONS:
         return None
     question = QUESTIONS[quantity]
+    if formulas.rolling_radius and (formulas.chart is not None or quantity not in OF_ROLLING_BODIES):
+        return None
     if quantity.startswith("normal_force") and not formulas.signed:
         if not is_length_known(formulas):
             return None
