@@ -108,10 +108,11 @@ def fill_rates(integrand, phi, work, out):  # type: ignore[no-untyped-def]
             s, c = sin(0.5 * phi[i]), cos(0.5 * phi[i])
             da[i] = (b - a) * s * s
             db[i] = (b - a) * c * c
+            out[1, i] = fabs((b - a) * s * c)  # the root of da*db, which may underflow
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
             out[0, i] = rows[1, i] / sqrt(2.0 * rows[0, i])
-            out[1, i] = rows[1, i] * (sqrt(fabs(da[i])) * sqrt(fabs(db[i])))  # the product of both may underflow
+            out[1, i] *= rows[1, i]
     elif kind == FROM_TURN:
         for i in range(n):
             da[i] = (b - a) * phi[i] * phi[i]
@@ -153,9 +154,10 @@ def fill_speeds(integrand, phi, work, out):  # type: ignore[no-untyped-def]
             s, c = sine(0.5 * phi[i]), cosine(0.5 * phi[i])
             da[i] = (b - a) * s * s
             db[i] = (b - a) * c * c
+            out[i] = fabs((b - a) * s * c)  # the root of da*db, which may underflow
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            out[i] = sqrt(fabs(da[i])) * sqrt(2.0 * fabs(db[i]) * rows[0, i])  # the product of both may underflow
+            out[i] *= sqrt(2.0 * rows[0, i])
     elif kind == TO_EQUILIBRIUM:
         for i in range(n):
             da[i] = (a - b) * exp(-phi[i])
