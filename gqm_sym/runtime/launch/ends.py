@@ -281,10 +281,12 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
     what, near, far = found
     if what == zeros.TURN:
         return EndOfMotion("turn", lam0 + near, offset=near)
-    # On an endless curve a search that goes far shows that the body does too, unless its first step was too wide.
-    goes_far = not isfinite(length) and abs(near) >= step
-    if what == zeros.STEPS_SPENT and not goes_far and not _speed_overflows(problem, near):
-        raise _too_many_barriers(problem)
+    if what == zeros.STEPS_SPENT and not _speed_overflows(problem, near):
+        # On an endless curve a search that goes far shows that the body does too, unless its first step was too wide;
+        # and steps become short where the curve is steep.
+        goes_far = not isfinite(length) and (abs(near) >= step or is_steep(problem, direction, lam0 + near))
+        if not goes_far:
+            raise _too_many_barriers(problem)
     if what == zeros.LIMIT and period:
         return EndOfMotion("closed", lam0 + direction * period)
     place = lam0 + (near if what == zeros.STEPS_SPENT else far)
