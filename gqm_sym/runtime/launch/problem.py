@@ -14,6 +14,7 @@ from gqm_sym.runtime.charts.double_double.panel_rates import (
     TURNING_POINT,
     ChartRates,
 )
+from gqm_sym.runtime.charts.double_double.passage import LaunchOnChart
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
 from gqm_sym.runtime.double_double.recording import BoundTape
 from gqm_sym.runtime.double_double.tapes import bind as bind_tape
@@ -24,9 +25,9 @@ from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues, true_piec
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.request import Launch
 from gqm_sym.runtime.launch.rounded import RoundedProblem
+from gqm_sym.runtime.multiprecision.exact_panels import is_launch_place, turns_of
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE, ExactProblem
 from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
-from gqm_sym.runtime.quadrature.substitution import FROM_TURN, TURN_TURN
 
 
 def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
@@ -170,24 +171,32 @@ def pieces_of(formulas: "Formulas", p: "ParameterValues") -> TruePieces | None:
     return p.true_pieces or None
 
 
+def launch_on_chart(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> LaunchOnChart | None:
+    """Return a launch along a charted curve in double-double arithmetic; None if that does not suffice, and for
+    formulas.
+    """
+    pieces, tape = pieces_of(formulas, p), tape_of(formulas, p)
+    if pieces is None or tape is None:
+        return None
+    return LaunchOnChart(pieces, tape, launch.lam0, launch.v0, launch.point, formulas.offset(p))
+
+
 def _rates_along(
     formulas: "Formulas", p: "ParameterValues", launch: "Launch", kind: int, ends: tuple[float, float]
 ) -> ChartRates | None:
     """Return the integrands of a segment along a charted curve (`ExactProblem.along_chart`)."""
-    pieces, tape, lam0 = pieces_of(formulas, p), tape_of(formulas, p), launch.lam0
-    if pieces is None or tape is None:
+    launched = launch_on_chart(formulas, p, launch)
+    if launched is None:
         return None
     chart, whats = formulas.charted(p), [PLACE, PLACE]
-    for i in range(2):
-        is_turn = kind == TURN_TURN or (kind == FROM_TURN and i == 0)
-        if ends[i] == lam0.value and not (is_turn and launch.v0.value):
+    for i, is_turn in enumerate(turns_of(kind)):
+        if is_launch_place(ends[i], is_turn, launch.lam0, launch.v0):
             whats[i] = LAUNCH_PLACE
         elif is_turn:
             whats[i] = TURNING_POINT
         elif not chart.period and ends[i] in (chart.edges[0], chart.edges[-1]):
             whats[i] = CURVE_BEGIN if ends[i] == chart.edges[0] else CURVE_END
-    given = (lam0, launch.v0, launch.point), kind, ends, (whats[0], whats[1]), formulas.offset(p)
-    rates = ChartRates(pieces, tape, *given)
+    rates = ChartRates(launched, kind, ends, (whats[0], whats[1]))
     return rates if rates.is_known else None
 
 

@@ -24,7 +24,7 @@ from gqm_sym.runtime.double_double.orbit_time import (
 from gqm_sym.runtime.gradients.formula_orbit import source_of, variables_of
 from gqm_sym.runtime.gradients.passages.from_turns import time_beside, times_from_turns
 from gqm_sym.runtime.interface import ExactFormulas
-from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.problem import Problem, launch_on_chart
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends
 from gqm_sym.runtime.multiprecision.exact_problem import MAX_SMOOTH_PANELS, NOWHERE, Arithmetic, two_doubles
@@ -95,14 +95,13 @@ def in_doubles(kind: str, segment: Segment, offsets: tuple[float, float]) -> Tim
 
 def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float, float]) -> ChartPassage | None:
     """Return the orbit along a chart in double-double arithmetic; None if that does not suffice, and for formulas."""
-    pieces, formulas, launch = problem.true_pieces, problem.tape, problem.launch
-    if pieces is None or formulas is None:
+    launch = launch_on_chart(problem.formulas, problem.p, problem.launch)
+    if launch is None:
         return None
     sense = direction if kind == "circulation" else 0
     distances = (0.0, direction * problem.period) if sense else (-offsets[0], offsets[1])
     low, high = sorted(launch.lam0.value + distance for distance in distances)
-    given, offset = (launch.lam0, launch.v0, launch.point), problem.formulas.offset(problem.p)
-    return pass_along(pieces, formulas, given, (low, high), sense, offset)
+    return pass_along(launch, (low, high), sense)
 
 
 def times_along(segment: Segment, *, is_thrown: bool) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 
 from gqm_sym.budgets import budget
 from gqm_sym.errors import SolutionError
+from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.panel_rates import panel_rates
 from gqm_sym.runtime.multiprecision.exact_problem import ExactProblem, two_doubles
@@ -37,6 +38,16 @@ DIGITS = 80
 ALL_NODES = np.concatenate([-NODES[:0:-1], NODES])
 
 
+def turns_of(kind: int) -> tuple[bool, bool]:
+    """Return which ends of a segment of a kind (`substitution`) are turning points."""
+    return {TURN_TURN: (True, True), FROM_TURN: (True, False)}.get(kind, (False, False))
+
+
+def is_launch_place(place: float, is_turn: bool, lam0: Number, v0: Number) -> bool:
+    """Return whether an end of a segment is the launch place; a turning point may be the same double."""
+    return place == lam0.value and not (is_turn and bool(v0.value))
+
+
 def exact_ends(
     exact: ExactProblem, digits: int, kind: int, a: float, b: float, known: tuple[Any, Any]
 ) -> tuple[Any, Any]:
@@ -56,11 +67,9 @@ def exact_ends(
         Its ends in extended precision, or None for each that is not known.
     """
     scale = exact.at(digits)
-    turns = {TURN_TURN: (True, True), FROM_TURN: (True, False)}.get(kind, (False, False))
     out = []
-    for place, is_turn, more in zip((a, b), turns, known, strict=True):
-        # The other end may be the same double.
-        if more is None and place == exact.lam0.value and not (is_turn and exact.v0.value):
+    for place, is_turn, more in zip((a, b), turns_of(kind), known, strict=True):
+        if more is None and is_launch_place(place, is_turn, exact.lam0, exact.v0):
             out.append(scale.lam0)
         elif is_turn:
             out.append(scale.turning_point(place if more is None else more))

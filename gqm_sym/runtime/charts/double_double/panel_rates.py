@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
-from gqm_sym.runtime.charts.double_double.making import TruePieces
-from gqm_sym.runtime.charts.double_double.offset_path import fill_path
-from gqm_sym.runtime.charts.double_double.passage import begin_orbit
+from gqm_sym.runtime.arithmetic.doubledouble import Pair, minus, plus
+from gqm_sym.runtime.charts.double_double.passage import LaunchOnChart, begin_orbit
 from gqm_sym.runtime.charts.double_double.pieces import (
     TRUE_CURVE,
     arc_between,
@@ -25,7 +22,7 @@ from gqm_sym.runtime.charts.double_double.pieces import (
     stacked_points,
     unshared,
 )
-from gqm_sym.runtime.charts.double_double.potential import Path, fill_registers
+from gqm_sym.runtime.charts.double_double.potential import Path, fill_potential
 from gqm_sym.runtime.charts.double_double.turning_points import (
     COLUMNS,
     LAUNCH,
@@ -40,11 +37,10 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply, square_root
-from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, call_interpreter
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW
 from gqm_sym.runtime.double_double.nodes import RULE
 from gqm_sym.runtime.double_double.panel_rates import GROWTHS, MAX_RATE_ERROR, PAIR, fill_shares
 from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
-from gqm_sym.runtime.double_double.recording import BoundTape
 
 # What an end of a segment is: a place, a turning point, the launch place, or the beginning or the end of an open curve.
 # Neither of the last three need be a double.
@@ -112,13 +108,9 @@ def rate_at(path, number, place):  # type: ignore[no-untyped-def]
     The curve parameter lam is the arc length of the curve, and ds that of the body's path.
     """
     curve, tape, work, level = path
-    address, operations, parts, registers = tape
-    u, points = stacked_places(), stacked_points()
+    u, points, value = stacked_places(), stacked_points(), tape[3][2]
     u[0], u[RULE] = place
-    error, _ = fill_path(curve, number, 1, u, points)
-    fill_registers(curve, tape, work, 1, points, error)
-    call_interpreter(address, operations, parts[0], parts[1], work, 1)
-    value = registers[2]
+    fill_potential(path, number, 1, u, points, tape[2][1])
     half, half_low = add(level[0], level[1], -work[value], -work[value + LOW])
     metric, metric_low = 1.0, 0.0
     if curve.offset[0] != 0.0:
@@ -184,20 +176,14 @@ class ChartRates:
 
     Parameters
     ----------
-    pieces : TruePieces
-        The curve.
-    formulas : BoundTape
-        The effective potential as a function of the plane.
-    launch : (Number, Number, (Number, Number) or None)
-        As for `passage.pass_along`.
+    launch : LaunchOnChart
+        The launch.
     kind : int
         The segment's kind (`quadrature.substitution`).
     ends : (float, float)
         Its ends as doubles.
     whats : (float, float)
         What they are, from PLACE to CURVE_END.
-    offset : pair of float
-        The distance of the body's path to the left of the curve.
 
     Attributes
     ----------
@@ -207,25 +193,16 @@ class ChartRates:
         The ends, each the double nearest to it.
     """
 
-    def __init__(
-        self,
-        pieces: TruePieces,
-        formulas: BoundTape,
-        launch: tuple[Number, Number, tuple[Number, Number] | None],
-        kind: int,
-        ends: tuple[float, float],
-        whats: tuple[float, float],
-        offset: Pair = ZERO,
-    ) -> None:
-        self._kind, self.is_known = kind, False
-        given = begin_orbit(pieces, formulas, launch, ends, 1, offset)
-        if given is None:
+    def __init__(self, launch: LaunchOnChart, kind: int, ends: tuple[float, float], whats: tuple[float, float]) -> None:
+        self._kind, self.is_known, pieces = kind, False, launch.pieces
+        located = begin_orbit(launch, ends, 1)
+        if located is None:
             return
         found = np.full((LAST + 1, COLUMNS), nan)
-        found[:ROWS] = given[-1]
-        self._given: Any = *given[:-1], found
+        found[:ROWS] = located[-1]
+        self._given: Any = *located[:-1], found
         a, b = ((*plus(pieces.start_length, (end, 0.0)), what) for end, what in zip(ends, whats, strict=True))
-        find_ends(*given[:-1], (a, b), pieces.begin, found)
+        find_ends(*located[:-1], (a, b), pieces.begin, found)
         self.is_known = bool(np.isfinite(found[BASE:, :2]).all())
         places = [minus(found[row, :2].tolist(), pieces.start_length)[0] for row in (FIRST, LAST)]
         turns = [what == TURNING_POINT for what in whats]

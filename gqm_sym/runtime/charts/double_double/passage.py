@@ -4,13 +4,13 @@ orbit.
 
 from functools import cached_property
 from math import nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
+from gqm_sym.runtime.arithmetic.doubledouble import Pair, minus, plus
 from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.charts.double_double.pieces import (
     TRUE_CURVE,
@@ -121,26 +121,25 @@ class ChartPassage:
     ----------
     pieces : TruePieces
         The curve.
-    formulas : BoundTape
-        The effective potential as a function of the plane.
-    found : (ROWS, COLUMNS) array
-        The result of `locate`; it is an attribute, too.
+    located : tuple
+        The result of `begin_orbit`.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
-    offset : pair of float
-        The distance of the body's path to the left of the curve (`TrueCurve`).
+
+    Attributes
+    ----------
+    found : (ROWS, COLUMNS) array
+        The result of `locate`.
     """
 
-    def __init__(
-        self, pieces: TruePieces, formulas: BoundTape, found: Array, direction: int, offset: Pair = ZERO
-    ) -> None:
-        self._pieces, self.found, self._direction = pieces, found, direction
-        self._given: Any = pieces.curve._replace(offset=offset), *formulas.operands, found
+    def __init__(self, pieces: TruePieces, located: tuple[Any, ...], direction: int) -> None:
+        self._pieces, self._located, self._direction = pieces, located, direction
+        self.found: Array = located[-1]
 
     def _times(self, stops: Array, middle: int) -> Array:
         """Return the times to stops, with errors (`fill_passage`)."""
         times = np.empty((len(stops), 3))
-        fill_passage(*self._given, stops, times, middle)
+        fill_passage(*self._located, stops, times, middle)
         return times
 
     @property
@@ -202,14 +201,32 @@ class ChartPassage:
         return None if np.isnan(times).any() else times[:-1]
 
 
-def begin_orbit(
-    pieces: TruePieces,
-    formulas: BoundTape,
-    launch: tuple[Number, Number, tuple[Number, Number] | None],
-    ends: tuple[float, float],
-    direction: int,
-    offset: Pair = ZERO,
-) -> tuple[Any, ...] | None:
+class LaunchOnChart(NamedTuple):
+    """A launch on a chart.
+
+    Attributes
+    ----------
+    pieces : TruePieces
+        The curve.
+    formulas : BoundTape
+        The effective potential as a function of the plane.
+    lam0, v0 : Number
+        Launch place, and speed in m/s.
+    point : (Number, Number) or None
+        The coordinates of the place if it was given by them.
+    offset : pair of float
+        The distance of the body's path to the left of the curve (`TrueCurve`).
+    """
+
+    pieces: TruePieces
+    formulas: BoundTape
+    lam0: Number
+    v0: Number
+    point: tuple[Number, Number] | None
+    offset: Pair
+
+
+def begin_orbit(launch: LaunchOnChart, ends: tuple[float, float], direction: int) -> tuple[Any, ...] | None:
     """Make the pieces of an orbit, and find its launch, its energy level and the turning points of a libration.
 
     The parameters are those of `pass_along`.
@@ -219,7 +236,7 @@ def begin_orbit(
     (curve, tape, work, p, found) or None
         The arguments of `locate` with its result; None if the orbit is too many laps away from the start.
     """
-    lam0, v0, point = launch
+    pieces, formulas, lam0, v0, point, offset = launch
     begin, count = pieces.begin, len(pieces.curve.counts)
     numbers = [begin, *map(pieces.number_of, (lam0.value, *ends))]
     if max(numbers) - min(numbers) > MAX_LAPS * count:
@@ -235,38 +252,24 @@ def begin_orbit(
     return *given, found
 
 
-def pass_along(
-    pieces: TruePieces,
-    formulas: BoundTape,
-    launch: tuple[Number, Number, tuple[Number, Number] | None],
-    ends: tuple[float, float],
-    direction: int,
-    offset: Pair = ZERO,
-) -> ChartPassage | None:
+def pass_along(launch: LaunchOnChart, ends: tuple[float, float], direction: int) -> ChartPassage | None:
     """Return an orbit along a chart; None if double-double arithmetic does not suffice.
 
     Parameters
     ----------
-    pieces : TruePieces
-        The curve.
-    formulas : BoundTape
-        The effective potential as a function of the plane.
-    launch : (Number, Number, (Number, Number) or None)
-        Launch place and speed in m/s, and the coordinates of the place if it was given by them.
+    launch : LaunchOnChart
+        The launch.
     ends : (float, float)
         The turning points of a libration, or the ends of a lap, as doubles know them.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
-    offset : pair of float
-        The distance of the body's path to the left of the curve.
     """
-    given = begin_orbit(pieces, formulas, launch, ends, direction, offset)
-    if given is None:
+    located = begin_orbit(launch, ends, direction)
+    if located is None:
         return None
-    lam0, found = launch[0], given[-1]
-    passage = ChartPassage(pieces, formulas, found, direction, offset)
+    passage, lam0 = ChartPassage(launch.pieces, located, direction), launch.lam0
     if direction == 0:
         (behind, ahead), enough = passage.offsets, MAX_MISMATCH * (ends[1] - ends[0])
         if not (abs(behind - lam0.value + ends[0]) <= enough and abs(ahead - ends[1] + lam0.value) <= enough):
             return None
-    return passage if found[LAUNCH, 1] == found[LAUNCH, 1] else None
+    return passage if passage.found[LAUNCH, 1] == passage.found[LAUNCH, 1] else None

@@ -57,6 +57,19 @@ def fill_registers(curve, tape, work, n, points, error):  # type: ignore[no-unty
 
 
 @Inner
+def fill_potential(path, number, n, u, points, last):  # type: ignore[no-untyped-def]
+    """Fill the points of the body's path at places on a piece, and the registers of the potential there, up to the
+    operation ``last`` of the tape; return the bounds on errors of `fill_path`.
+    """
+    curve, tape, work, _ = path
+    address, operations, parts, _ = tape
+    error, rate_error = fill_path(curve, number, n, u, points)
+    fill_registers(curve, tape, work, n, points, error)
+    call_interpreter(address, operations, parts[0], last, work, n)
+    return error, rate_error
+
+
+@Inner
 def energy_at(path, number, place):  # type: ignore[no-untyped-def]
     """Return the potential (two doubles, error) at a place on a piece, its derivative with respect to u, and the
     derivative of arc length with respect to u.
@@ -64,13 +77,10 @@ def energy_at(path, number, place):  # type: ignore[no-untyped-def]
     The potential is that on the body's path; the arc length is that of the curve.
     """
     curve, tape, work, _ = path
-    address, operations, parts, registers = tape
     u, points = stacked_places(), stacked_points()
     u[0], u[RULE] = place
-    error, _ = fill_path(curve, number, 1, u, points)
-    fill_registers(curve, tape, work, 1, points, error)
-    call_interpreter(address, operations, parts[0], parts[2], work, 1)
-    _, _, value, by_x, by_z, by_y = registers
+    fill_potential(path, number, 1, u, points, tape[2][2])
+    _, _, value, by_x, by_z, by_y = tape[3]
     s, s_low = multiply(work[by_x], work[by_x + LOW], points[DX], points[DX_LOW])
     t, t_low = multiply(work[by_z], work[by_z + LOW], points[DZ], points[DZ_LOW])
     slope = add(s, s_low, t, t_low)

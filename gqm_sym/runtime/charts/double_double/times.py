@@ -10,17 +10,16 @@ from math import fabs, nan, sqrt
 
 import numpy as np
 
-from gqm_sym.runtime.charts.double_double.offset_path import fill_path
 from gqm_sym.runtime.charts.double_double.pieces import (
     squared_rate,
     stacked_places,
     stacked_points,
 )
-from gqm_sym.runtime.charts.double_double.potential import energy_at, fill_registers, position
+from gqm_sym.runtime.charts.double_double.potential import energy_at, fill_potential, position
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply, square_root
-from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW
 from gqm_sym.runtime.double_double.nodes import RULE
 
 # A panel is resolved if its last two Legendre coefficients are below this share of the first: the error of the rule is
@@ -69,14 +68,11 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
     changes over the shift.
     """
     curve, tape, work, level = path
-    address, operations, parts, registers = tape
     u, points, factors, sums = stacked_places(), stacked_points(), stacked_places(), stacked_sums()
     width = add(right[0], right[1], -left[0], -left[1])
     fill_places(curve, left, width, spread, u, factors)
-    error, rate_error = fill_path(curve, number, RULE, u, points)
-    fill_registers(curve, tape, work, RULE, points, error)
-    call_interpreter(address, operations, parts[0], parts[1], work, RULE)
-    potential = work[registers[2] : registers[2] + ROW]
+    _, rate_error = fill_potential(path, number, RULE, u, points, tape[2][1])
+    potential = work[tape[3][2] : tape[3][2] + ROW]
     from_turn, q, shift, rate = spread[0] != 0.0 and left[0] == 0.0, 1.0, level[3], 0.0
     for i in range(RULE):
         half, half_low = add(level[0], level[1], -potential[i], -potential[LOW + i])
