@@ -232,31 +232,48 @@ def fill_by_difference(fns, path_in_space, p, launch, places, low_parts, field):
     last four; 0 if there are none.
     """
     n, lam0, w0, size = places.size, launch.lam0, launch.w0, launch.size
-    is_filled = size >= 0.0
-    divdiff, offsets = np.empty(2 * n), places - lam0
-    better, frame = np.empty(n), np.empty(PATH_ROWS * n)
-    v2, force, sizes = field[4 * n : 5 * n], field[5 * n : 6 * n], field[6 * n : 7 * n]
+    divdiff, offsets, better = np.empty(2 * n), places - lam0, np.empty(n)
     if low_parts.size:
         offsets += low_parts
     call_potential_divdiff1(fns.potential_divdiff1, n, lam0, places, offsets, p, divdiff)
     for i in range(n):
-        by_difference = w0 - (2.0 * offsets[i] * divdiff[i] - launch.v2_correction)
-        better[i] = v2[i] if is_filled and keeps_digits(w0, v2[i], size + sizes[i]) else by_difference
-    call_path_and_contact_force(fns.path_and_contact_force, n, places, better, p, frame)
-    if not is_filled:
-        field[: 4 * n] = frame[: 4 * n]
+        better[i] = w0 - (2.0 * offsets[i] * divdiff[i] - launch.v2_correction)
+    if size >= 0.0:
+        replace_rounded(fns, path_in_space, p, launch, places, better, field)
+        return
+    call_path_and_contact_force(fns.path_and_contact_force, n, places, better, p, field)
+    for i in range(n):
+        field[5 * n + i], field[4 * n + i] = field[4 * n + i], better[i]
     if path_in_space:
-        first, rows = LOAD_MAP_ROWS * n, np.empty(SPACE_ROWS * n)
-        call_path_in_space(path_in_space, n, places, better, 1.0, p, rows)
+        call_path_in_space(path_in_space, n, places, better, 1.0, p, field[LOAD_MAP_ROWS * n :])
+
+
+@Inner
+def replace_rounded(fns, path_in_space, p, launch, places, better, field):  # type: ignore[no-untyped-def]
+    """Fill a block of a load map, which is filled by subtraction, anew where that loses digits of V**2.
+
+    ``better`` is V**2 by a divided difference, and on return what V**2 is.
+    """
+    n, w0, size = places.size, launch.w0, launch.size
+    keeps, rows = np.empty(n), np.empty((PATH_ROWS + SPACE_ROWS) * n)
+    for i in range(n):
+        v2 = field[4 * n + i]
+        keeps[i] = 1.0 if keeps_digits(w0, v2, size + field[6 * n + i]) else 0.0
+        better[i] = v2 if keeps[i] else better[i]
+    call_path_and_contact_force(fns.path_and_contact_force, n, places, better, p, rows)
+    for i in range(n):
+        field[5 * n + i] = field[5 * n + i] if keeps[i] else rows[4 * n + i]
+        field[4 * n + i] = better[i]
+    if path_in_space:
+        call_path_in_space(path_in_space, n, places, better, 1.0, p, rows[PATH_ROWS * n :])
         for k in range(SPACE_ROWS):
             for i in range(n):
-                keeps = is_filled and keeps_digits(w0, v2[i], size + sizes[i])
-                field[first + k * n + i] = field[first + k * n + i] if keeps else rows[k * n + i]
-                # The rows before come from the same function, whether the load map of the block is known or not.
-                field[k * n + i] = field[k * n + i] if keeps else frame[k * n + i]
-    for i in range(n):
-        force[i] = force[i] if is_filled and keeps_digits(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
-    v2[:] = better
+                # The first rows come from the same function, whether the load map of the block is known or not.
+                field[k * n + i] = field[k * n + i] if keeps[i] else rows[k * n + i]
+        for k in range(SPACE_ROWS):
+            for i in range(n):
+                at, of = (LOAD_MAP_ROWS + k) * n + i, (PATH_ROWS + k) * n + i
+                field[at] = field[at] if keeps[i] else rows[of]
 
 
 @Inner
