@@ -1,9 +1,9 @@
 """The state of a body at any times on a trajectory of many segments, in one call from Python.
 
 The data of all segments are stored in one record (`records.record`), because passing many arrays would take longer than
-reading them. The segments are of all kinds but FROM_SLOW (`quadrature.substitution`), and have polynomials for the
-phase angle over time (`table`), and for arc length and speed over the phase angle. The intervals of time follow each
-other, beginning at launch.
+reading them. The segments are of all kinds but FROM_SLOW and FROM_SLOW_TURN (`quadrature.substitution`), and have
+polynomials for the phase angle over time (`table`), and for arc length and speed over the phase angle. The intervals of
+time follow each other, beginning at launch.
 
 =================== ========================================================================================
 section             contents

@@ -19,7 +19,14 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.quadrature.equilibrium import speed_and_length_factors
-from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import (
+    FROM_SLOW,
+    FROM_SLOW_TURN,
+    FROM_TURN,
+    REGULAR,
+    TO_EQUILIBRIUM,
+    TURN_TURN,
+)
 
 # If V**2 is given by polynomials, no function of the model is called.
 NO_FUNCTIONS = Addresses(0, 0, 0, 0, 0)
@@ -35,12 +42,12 @@ class Integrand(NamedTuple):
     p : array
         Run-time parameters.
     kind : int
-        TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM or, for times only, FROM_SLOW.
+        TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM or, for times only, FROM_SLOW and FROM_SLOW_TURN.
     a, b : float
         Values of the curve parameter at both ends.
     ref, w0 : float
-        For REGULAR segments a place, and V**2 there in (m/s)**2. For FROM_SLOW segments the slope of the effective
-        potential at ``a``, and V**2 there.
+        For REGULAR segments a place, and V**2 there in (m/s)**2. For FROM_SLOW and FROM_SLOW_TURN segments the slope of
+        the effective potential at ``a``, and V**2 there.
     field : (n, m) array
         V**2 next to the equilibrium ``b`` with dissipative forces (`equilibrium`), else empty.
     """
@@ -57,7 +64,9 @@ class Integrand(NamedTuple):
 
 @Inner
 def fill_rates_from_place(integrand, phi, work, out):  # type: ignore[no-untyped-def]
-    """Do the work of `fill_rates` for a segment without turning points, from V**2 at one place."""
+    """Do the work of `fill_rates` for a segment on which V**2 follows from V**2 at one place, and from the slope of the
+    potential there if the body is slow.
+    """
     fns, p, kind, a, b, ref, w0, _ = integrand
     n = phi.size
     da, db, rows = work[0, :n], work[1, :n], work[2:4, :n]
@@ -69,12 +78,18 @@ def fill_rates_from_place(integrand, phi, work, out):  # type: ignore[no-untyped
         for i in range(n):
             out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w0 - 2.0 * da[i] * rows[0, i])
     else:  # the mean slope from ``a`` is the sum of the slope there and a term with the second difference
+        at_turn = kind == FROM_SLOW_TURN
         for i in range(n):
-            da[i] = (b - a) * phi[i]
+            da[i] = (b - a) * phi[i] * (phi[i] if at_turn else 1.0)
             db[i] = -da[i]
         call_potential_divdiff2(fns.potential_divdiff2, n, a, a, da, db, p, rows)
         for i in range(n):
-            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w0 - 2.0 * da[i] * (ref + da[i] * rows[0, i]))
+            loss = 2.0 * (ref + da[i] * rows[0, i])
+            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w0 - (b - a if at_turn else da[i]) * loss)
+        if at_turn:
+            for i in range(n):
+                out[0, i] *= 2.0
+                rows[1, i] *= 2.0 * phi[i]
     for i in range(n):
         out[1, i] = rows[1, i] * fabs(b - a)
 
@@ -123,7 +138,7 @@ def fill_rates(integrand, phi, work, out):  # type: ignore[no-untyped-def]
             fall = -2.0 * rows[0, i] if b > a else 2.0 * rows[0, i]
             out[0, i] = rows[1, i] * root / sqrt(fall)
             out[1, i] = rows[1, i] * 2.0 * fabs(b - a) * phi[i]
-    elif kind in (REGULAR, FROM_SLOW):
+    elif kind in (REGULAR, FROM_SLOW, FROM_SLOW_TURN):
         fill_rates_from_place(integrand, phi, work, out)
     else:
         for i in range(n):
@@ -205,7 +220,7 @@ def cancellation_range(integrand, work, n, peak):  # type: ignore[no-untyped-def
         low, high = inf, 0.0
         for i in range(n):
             low, high = min(low, work[2, i]), max(high, work[2, i])
-    elif kind not in (TO_EQUILIBRIUM, FROM_SLOW):
+    elif kind not in (TO_EQUILIBRIUM, FROM_SLOW, FROM_SLOW_TURN):
         # Towards the place where V**2 is known, its relative error only decreases.
         outwards = fabs(work[0, 0]) <= fabs(work[0, n - 1])
         for i in range(n):

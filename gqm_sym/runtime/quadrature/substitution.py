@@ -9,6 +9,7 @@ TURN_TURN       a + (b-a) sin(phi/2)**2                 0 to pi
 FROM_TURN       a + (b-a) phi**2                        0 to 1
 REGULAR         a + (b-a) phi                           0 to 1
 FROM_SLOW       a + (b-a) phi                           0 to 1
+FROM_SLOW_TURN  a + (b-a) phi**2                        0 to 1
 TO_EQUILIBRIUM  b + (a-b) exp(-phi)                     0 onwards
 =============== ======================================= ================================
 
@@ -25,9 +26,10 @@ from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inlined
 from gqm_sym.runtime.compiled.types import Array
 
-# Kinds of segments: between turning points, from a turning point, without special ends, towards an equilibrium, and
-# from a place where the body is slowest, such as next to a hilltop that it passes.
-TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM, FROM_SLOW = range(5)
+# Kinds of segments: between turning points, from a turning point, without special ends, towards an equilibrium, from a
+# place where the body is slowest, such as next to a hilltop that it passes, and from a turning point, which may be next
+# to a hilltop.
+TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM, FROM_SLOW, FROM_SLOW_TURN = range(6)
 
 # Smaller than the square root of any positive double, so that a quotient by the greater of both is defined at zero too.
 MIN_ROOT = 1e-200

@@ -16,7 +16,7 @@ from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.quadrature.integrands import NO_FUNCTIONS, Integrand, cancellation_range, fill_rates
 from gqm_sym.runtime.quadrature.kronrod import EVEN, GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES, ODD
-from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_SLOW_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
 # Status of a segment's quadrature.
 CONVERGED, FLOOR, EXHAUSTED, FAILED, ILL_CONDITIONED = range(5)
@@ -381,15 +381,16 @@ def orbit_panels(fns, p, kind, a, b, lam0, w0, joints):  # type: ignore[no-untyp
     Parameters
     ----------
     kind : int
-        TURN_TURN, FROM_TURN, REGULAR or FROM_SLOW (`substitution`).
+        TURN_TURN, FROM_TURN, REGULAR, FROM_SLOW or FROM_SLOW_TURN (`substitution`).
     a, b : float
         The ends of the segment; a single turning point is ``a``.
     lam0, w0 : float
-        The launch place, and V**2 there; used by REGULAR and FROM_SLOW segments (`Integrand`).
+        The launch place, and V**2 there; not used by TURN_TURN and FROM_TURN segments (`Integrand`).
     joints : array
         The places inside the segment at which the curve is not smooth, in ascending order.
     """
-    ref, w, stop = (lam0, w0, 1.0) if kind in (REGULAR, FROM_SLOW) else (a, 0.0, pi if kind == TURN_TURN else 1.0)
+    from_place, stop = kind in (REGULAR, FROM_SLOW, FROM_SLOW_TURN), pi if kind == TURN_TURN else 1.0
+    ref, w = (lam0, w0) if from_place else (a, 0.0)
     marks = np.empty(joints.size + 2)
     marks[0], marks[-1] = 0.0, stop
     for i in range(joints.size):

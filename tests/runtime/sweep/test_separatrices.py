@@ -127,6 +127,22 @@ def test_bodies_that_pass_a_hilltop_closely_on_a_closed_curve(modules: dict[str,
             assert ulps(float(arrival), 2 / mpf(speed) * mp.ellipf(mpf(9) / 2, m)) <= MAX_PASSING_ULPS
 
 
+def test_arrivals_of_bodies_that_start_at_rest_beside_a_hilltop(modules: dict[str, ModuleType]) -> None:
+    """Times at places on a swing that begins beside the top, and at ones beside where it turns, are answered by
+    compiled code to the last place of their closed form, an incomplete elliptic integral.
+    """
+    pendulum = modules["pendulum"]
+    lam0, lam = np.pi - np.array([1e-2, 1e-3, 1e-4, 1e-5]), np.array([[1.0], [-2.0], [-3.0], [-3.125]])
+    swept = pendulum.sweep("time_at", lam0, 0.0, -1, lam=lam)
+    assert (swept.route == SINGLE).all()
+    with mp.workdps(40):
+        for (k, j), value in np.ndenumerate(swept.values):
+            modulus = mp.sin(mpf(lam0[j]) / 2)
+            phase = mp.asin(mp.sin(mpf(lam[k, 0]) / 2) / modulus)
+            truth = (mp.ellipk(modulus**2) - mp.ellipf(phase, modulus**2)) / mp.sqrt(mpf(9.81))
+            assert ulps(float(value), truth) <= 2
+
+
 @pytest.mark.extended
 def test_bodies_that_pass_a_hilltop_closely_and_leave(tmp_path: Path) -> None:
     """The time until bodies leave is that of the integral, whether they turn before or not."""

@@ -20,8 +20,8 @@ from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import add
 from gqm_sym.runtime.double_double.interpreter import LOW, call_interpreter
 from gqm_sym.runtime.double_double.quadrature import TAPE, energy_level, fill_parameters
-from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_TURN
-from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels
+from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_SLOW_TURN
+from gqm_sym.runtime.quadrature.time_panels import are_accurate, orbit_panels
 from gqm_sym.runtime.sweep.orbit import Orbit
 from gqm_sym.runtime.sweep.single.orbit_extremes import (
     GRID_INTERVALS,
@@ -45,6 +45,10 @@ WIDENINGS, WIDENED = 3, 16.0
 # smallest is halved.
 MAX_PARTS, HALVINGS = 16, 36
 
+# The largest number of steps of Newton's method to a turning point, and the share of the slope there by which a last
+# step may change it.
+MAX_STEPS, LAST_PLACES = 4, 2.0**-51
+
 
 class RecordedFormulas(NamedTuple):
     """A module's formulas as a tape, with registers and parameters (`recording.BoundTape`). If there are no registers,
@@ -63,8 +67,10 @@ grid_buffer, place_buffer, point_buffer = on_stack(GRID_POINTS), on_stack(MAX_PA
 
 
 @Inner
-def fill_exactly(curve, lam0, places, count, v2, slopes):  # type: ignore[no-untyped-def]
-    """Fill in V**2 and the slope of the potential at some places, rounded from double-double arithmetic."""
+def fill_exactly(curve, lam0, places, lows, count, v2, slopes):  # type: ignore[no-untyped-def]
+    """Fill in V**2 and the slope of the potential at some places, given in two doubles each, rounded from double-double
+    arithmetic.
+    """
     tape, work, p = curve.exact
     for k in range(p.shape[1]):
         p[0, k] = curve.p[k]
@@ -73,7 +79,7 @@ def fill_exactly(curve, lam0, places, count, v2, slopes):  # type: ignore[no-unt
     at = registers[1]
     work[at], work[at + LOW] = lam0, 0.0
     for i in range(count):
-        work[at + 1 + i], work[at + 1 + i + LOW] = places[i], 0.0
+        work[at + 1 + i], work[at + 1 + i + LOW] = places[i], lows[i]
     call_interpreter(address, operations, parts[0], parts[2], work, count + 1)
     level, low, _ = energy_level(work, registers, (lam0, 0.0, curve.v0, 0.0), 0)
     for i in range(count):
@@ -130,10 +136,10 @@ def exact_extreme_speed(curve, orbit, value, share):  # type: ignore[no-untyped-
         place, low_part = place - reach * (after + before) / (after - before), 0.0
     elif before * after < 0.0:
         place, low_part = equilibrium_between(curve, place - reach, place + reach, before), 0.0
-    places, v2, slopes = place_buffer(), place_buffer(), place_buffer()
-    places[0] = place
-    fill_exactly(curve, orbit.lam0, places, 1, v2, slopes)
-    square = v2[0] - 2.0 * slopes[0] * low_part
+    places, lows, v2, slopes = place_buffer(), place_buffer(), place_buffer(), place_buffer()
+    places[0], lows[0] = place, low_part
+    fill_exactly(curve, orbit.lam0, places, lows, 1, v2, slopes)
+    square = v2[0]
     return sqrt(square) if square > 0.0 else nan
 
 
@@ -150,12 +156,25 @@ def rate_at(curve, orbit, place):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def is_steep(curve, turn, place, slope):  # type: ignore[no-untyped-def]
-    """Return whether the potential falls from a turning point so steeply that its divided differences do not cancel."""
-    point = point_buffer()
-    point[0], point[1] = place, place - turn
-    call_potential_divdiff1(curve.fns.potential_divdiff1, 1, turn, point[:1], point[1:2], curve.p, point[2:])
-    return fabs(slope) > MIN_CANCELLATION_RATIO * fabs(point[2])
+def improve_turns(curve, orbit, turns, count, places, lows, v2, slopes):  # type: ignore[no-untyped-def]
+    """Fill in V**2 and the slope of the potential at some places, after steps of Newton's method by which the first and
+    the last one are turning points to twice the digits, if ``turns`` says that they are; return whether they are.
+
+    Beside a hilltop a body turns where the slope is so small that a rounding of the place would tell.
+    """
+    before = slopes[0], slopes[count - 1]
+    for step in range(MAX_STEPS):
+        fill_exactly(curve, orbit.lam0, places, lows, count, v2, slopes)
+        is_settled = True
+        for end in range(2):
+            k = count - 1 if end else 0
+            if turns[end] and v2[k] != 0.0:
+                lows[k] += 0.5 * v2[k] / slopes[k]
+                is_settled &= step > 0 and fabs(slopes[k] - before[end]) <= LAST_PLACES * fabs(slopes[k])
+        if is_settled:
+            return True
+        before = slopes[0], slopes[count - 1]
+    return False
 
 
 @Inner
@@ -168,21 +187,20 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
         A curve with formulas.
     orbit : Orbit
         The orbit.
-    ends : (float, float)
-        The offsets of both places from the launch.
+    ends : ((float, float), (float, float))
+        Both places, as two doubles each.
     turns : (bool, bool)
         Whether each of them is a turning point.
     """
     fns, p, none, last = curve.fns, curve.p, curve.joints[:0], GRID_INTERVALS
-    (begin, end), lam0 = ends, orbit.lam0
+    ((first, first_low), (final, final_low)), lam0 = ends, orbit.lam0
+    begin, end = (first - lam0) + first_low, (final - lam0) + final_low
     if not begin < end:
         return 0.0 if begin == end else nan
     v2, cuts, places = grid_buffer(), place_buffer(), place_buffer()
-    slowest, slopes = place_buffer(), place_buffer()
+    lows, slowest, slopes = place_buffer(), place_buffer(), place_buffer()
     part_orbit = Orbit(False, False, orbit.direction, lam0, orbit.v2, begin, end, 0)
     sample_loads(curve, part_orbit, (V2, 0, *WHOLE), WIDTH_SHARES, GRID_POINTS, v2, v2, False)
-    # The ends are known with their rounding errors; the places in between are doubles.
-    (first, first_low), (final, final_low) = two_sum(lam0, begin), two_sum(lam0, end)
     count, peak, at_peak, largest = 0, -1.0, 0, 0.0
     for i in range(GRID_POINTS):
         largest = max(largest, v2[i])
@@ -198,27 +216,31 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
             width = end - begin
             low, high = lam0 + (begin + width * WIDTH_SHARES[i - 1]), lam0 + (begin + width * WIDTH_SHARES[i + 1])
             place = equilibrium_between(curve, low, high, 1.0)
-        places[count] = place
+        places[count], lows[count] = place, 0.0
         cuts[count] = first if count == 0 else lam0 + (begin + (end - begin) * WIDTH_SHARES[at_peak])
         peak, count = v2[i], count + 1
-    fill_exactly(curve, lam0, places, count, slowest, slopes)
+    at_turns = turns[0] and places[0] == first, turns[1] and places[count - 1] == final
+    lows[0] = first_low if at_turns[0] else lows[0]
+    lows[count - 1] = final_low if at_turns[1] else lows[count - 1]
+    if not improve_turns(curve, orbit, at_turns, count, places, lows, slowest, slopes):
+        return nan
     total = 0.0
     for k in range(count):
         place, w = places[k], slowest[k]
-        at_turn = (turns[0] and place == first) or (turns[1] and place == final)
+        at_turn = (k == 0 and at_turns[0]) or (k == count - 1 and at_turns[1])
         if not (at_turn or w > MIN_V2_SHARE * largest):
             return nan
         for side in range(2):
             stop = cuts[k] if side == 0 else (cuts[k + 1] if k + 1 < count else final)
             if stop == place:
                 continue
-            if at_turn and not is_steep(curve, place, stop, slopes[k]):
-                return nan
-            panels = orbit_panels(fns, p, FROM_TURN if at_turn else FROM_SLOW, place, stop, slopes[k], w, none)
+            panels = orbit_panels(fns, p, FROM_SLOW_TURN if at_turn else FROM_SLOW, place, stop, slopes[k], w, none)
             if not are_accurate(panels):
                 return nan
             total += panels.times[-1]
     beside_first, beside_final = cuts[1] if count > 1 else final, cuts[count - 1]
+    first_low = lows[0] if at_turns[0] else first_low
+    final_low = lows[count - 1] if at_turns[1] else final_low
     total -= first_low * rate_at(curve, orbit, beside_first if turns[0] else first)
     return total + final_low * rate_at(curve, orbit, beside_final if turns[1] else final)
 
@@ -240,24 +262,26 @@ def passing_time(curve, orbit, place):  # type: ignore[no-untyped-def]
     The orbit's turning points must be accurate to all digits, and the body must reach the place.
     """
     low, high, direction, turns = orbit.low, orbit.high, orbit.direction, turns_at(orbit)
+    launch, lower, upper = (orbit.lam0, 0.0), two_sum(orbit.lam0, low), two_sum(orbit.lam0, high)
     if place != place and orbit.leaves == 0:
-        return time_in_parts(curve, orbit, (low, high), turns)
-    ahead, laps, lap = place - orbit.lam0, 0.0, 0.0
+        return time_in_parts(curve, orbit, (lower, upper), turns)
+    ahead, laps, lap, target = place - orbit.lam0, 0.0, 0.0, (place, 0.0)
     if place != place:
-        ahead = high if orbit.leaves > 0 else low
+        ahead, target = (high, upper) if orbit.leaves > 0 else (low, lower)
     elif orbit.circulates:
         width = high - low
         laps = np.floor(direction * ahead / width)
         ahead -= direction * laps * width
-        lap = time_in_parts(curve, orbit, (low, high), turns) if laps > 0.0 else 0.0
+        target = two_sum(orbit.lam0, ahead)
+        lap = time_in_parts(curve, orbit, (lower, upper), turns) if laps > 0.0 else 0.0
     at_low, at_high = turns[0] and ahead <= low, turns[1] and ahead >= high
     if direction * ahead >= 0.0:
         begins, stops = turns[0] and low == 0.0, turns[1] and high == 0.0
-        ends = (0.0, ahead) if direction > 0 else (ahead, 0.0)
+        ends = (launch, target) if direction > 0 else (target, launch)
         flags = (begins, at_high) if direction > 0 else (at_low, stops)
         return laps * lap + time_in_parts(curve, orbit, ends, flags)
     if direction > 0:
-        there = time_in_parts(curve, orbit, (0.0, high), (False, True))
-        return there + time_in_parts(curve, orbit, (ahead, high), (at_low, True))
-    there = time_in_parts(curve, orbit, (low, 0.0), (True, False))
-    return there + time_in_parts(curve, orbit, (low, ahead), (True, at_high))
+        there = time_in_parts(curve, orbit, (launch, upper), (False, True))
+        return there + time_in_parts(curve, orbit, (target, upper), (at_low, True))
+    there = time_in_parts(curve, orbit, (lower, launch), (True, False))
+    return there + time_in_parts(curve, orbit, (lower, target), (True, at_high))
