@@ -142,7 +142,7 @@ class DissipativeMotion(FollowedMotion):
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)
-        found = sensitivities_at(self._changes, points, list(rows.values()))
+        found = sensitivities_at(self._changes_at(points), points, list(rows.values()))
         return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
 
     @locked
@@ -150,7 +150,7 @@ class DissipativeMotion(FollowedMotion):
         """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)
-        found = places_at(self, self._changes, points, list(rows.values())).reshape(len(rows), *shape)
+        found = places_at(self, self._changes_at(points), points, list(rows.values())).reshape(len(rows), *shape)
         self._check_known("sensitivity", rows, found)
         return found
 
@@ -181,6 +181,13 @@ class DissipativeMotion(FollowedMotion):
     def _changes(self) -> Changes:
         """The derivatives of the legs so far."""
         return self._changes_along(self._varied_runs)
+
+    def _changes_at(self, points: MarchPoints) -> Changes:
+        """Return the derivatives of the legs up to the last of some points at least."""
+        known, count, runs = self._known_changes, int(points.half.max(initial=0)) // 2 + 1, self._layout.runs
+        followed = 0 if known is None else known.followed
+        # Each time many more are followed, lest later and later points are asked for one by one.
+        return self._changes_along(runs[: count if followed >= count else max(count, 2 * followed)])
 
     def _changes_along(self, runs: Sequence[Run]) -> Changes:
         """Return the derivatives of the first runs."""

@@ -315,35 +315,40 @@ def extreme(motion: Any, quantity: str) -> Array:
     at the jump.
     """
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
-    changes = motion._changes
+    changes = motion._changes_at(motion._march_points(found.t)[0])
     if of_speed and found.value == 0.0:
         return np.zeros(changes.variables)
     t_end, moved = _searched_until(motion), np.zeros((changes.variables, 1))
     at_end, at_break = abs(t_end - found.t) <= AT_END * t_end, _is_at_break(changes, found.lam)
     if at_end and not (at_break and motion.legs[-1].end == "liftoff"):
-        t, moved = t_end, end(motion, changes)[1][:, None]
+        t, moved = t_end, end(motion, motion._changes)[1][:, None]
     else:
-        t, is_stationary = _improved(motion, changes, of_speed, found)
+        t, is_stationary = _improved(motion, of_speed, found)
         if not is_stationary and at_break:
             # It is evaluated at two times on the side of the extreme, and extrapolated to the time of the extreme
             # itself.
             sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]])[: 1 if at_end else 2] * SIDE_SHARE * t_end
             states = [motion.state(side[0]) for side in sides]
             values = [abs(state.v) if of_speed else state.normal_force for state in states]
-            near, far = _changed(
-                motion, changes, of_speed, sides[np.argmin(np.abs(np.subtract(values, found.value)))]
-            ).T
+            near, far = _changed(motion, of_speed, sides[np.argmin(np.abs(np.subtract(values, found.value)))]).T
             on_place: Array = 2.0 * near - far
             return on_place
-    at_time: Array = _changed(motion, changes, of_speed, np.array([t]), moved)[:, 0]
+    at_time: Array = _changed(motion, of_speed, np.array([t]), moved)[:, 0]
     return at_time
 
 
-def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Array | None = None) -> Array:
+def _states_at_times(motion: Any, t: Array) -> tuple[Changes, StateChanges]:
+    """Return the changes of a motion's legs, as far as they are needed, and of its states at times."""
+    points, _ = motion._march_points(t)
+    changes = motion._changes_at(points)
+    return changes, states_at(changes, points)
+
+
+def _changed(motion: Any, of_speed: bool, t: Array, moved: Array | None = None) -> Array:
     """Return the changes of the speed or the contact force at times that change by ``moved``; without it, the places
     stay fixed.
     """
-    changed, v = states_at(changes, motion._march_points(t)[0]), motion.state(t).v
+    (changes, changed), v = _states_at_times(motion, t), motion.state(t).v
     if moved is None:
         moved = -changed.labels * changed.law.ds / v
     if of_speed:
@@ -359,8 +364,8 @@ def forces_at_places(motion: Any, places: Array) -> Array:
     """Return the derivatives of the contact force along the motion and at fixed places of its launch leg: a row for the
     place, and one for each variable.
     """
-    changes, times = motion._changes, np.array([motion.time_at(place) for place in places.tolist()])
-    law, changed = changes.law, states_at(changes, motion._march_points(times)[0])
+    changes, changed = _states_at_times(motion, np.array([motion.time_at(place) for place in places.tolist()]))
+    law = changes.law
     by_place = law.parameters[0, law.mass] * law.loads(changed.states)[0]
     found: Array = np.vstack([by_place, changed.normal_force - by_place * changed.lam])
     return found
@@ -374,14 +379,14 @@ def _searched_until(motion: Any) -> float:
     return t_end if t_end < np.inf else float(motion._up_to_turn(3).segments[-1].t_stop[0])
 
 
-def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tuple[float, bool]:
+def _improved(motion: Any, of_speed: bool, found: Any) -> tuple[float, bool]:
     """Return the time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
 
     The time is left where it is not.
     """
     t, t_end = found.t, _searched_until(motion)
     for _ in range(NEWTON_STEPS):
-        changed = states_at(changes, motion._march_points(np.array([t]))[0])
+        changes, changed = _states_at_times(motion, np.array([t]))
         law = changed.law
         slope, by_place, by_w = law.force if of_speed else changes.law.loads(changed.states)
         slope_rate, v = by_place[0] + by_w[0] * law.force[0, 0], motion.state(t).v
