@@ -5,6 +5,8 @@ from itertools import pairwise
 from math import atan2, dist, hypot, pi
 from statistics import median
 
+import numpy as np
+
 from gqm_sym.declare.points import IN_SPACE, Place
 from gqm_sym.errors import DeclarationError, NoisyPointsWarning
 
@@ -116,24 +118,25 @@ def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
 
     Scatter of points at distances h contributes to the curvature divided by h**2. If it dominates the curvature, the
     sign of the curvature changes between most neighbours; the sign of the curvature's changes shows it earlier, and on
-    a loop as well.
+    a loop as well. In space the curvature is a vector: of its change, the part across the track counts, and changes
+    have opposite signs if they point to opposite sides.
     """
-    chords = _chords(places, joined)
-    if joined:
-        chords.append(chords[0])
-    bends = [
-        2.0 * turn / (before + after)
-        for turn, (before, after) in zip(_turns(places, joined), pairwise(chords), strict=True)
-    ]
-    steps = [after - before for before, after in pairwise(bends)]
-    swings = [abs(after - before) / 4.0 for before, after in pairwise(steps) if before * after < 0.0]
-    if len(swings) <= MAX_ALTERNATING_SHARE * (len(steps) - 1):
+    chords = np.diff(np.array([*places, *places[:2]] if joined else places), axis=0)
+    lengths = np.linalg.norm(chords, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ahead = chords / lengths[:, None]
+        bends = 2.0 * np.diff(ahead, axis=0) / (lengths[:-1] + lengths[1:])[:, None]
+    steps, along = np.diff(bends, axis=0), ahead[1:-1]
+    steps -= (steps * along).sum(axis=1)[:, None] * along
+    alternate = (steps[:-1] * steps[1:]).sum(axis=1) < 0.0
+    swings = np.linalg.norm(np.diff(steps, axis=0), axis=1)[alternate] / 4.0
+    if len(swings) <= MAX_ALTERNATING_SHARE * len(alternate):
         return
-    felt = 2.0 * extent(places) * median(swings)
+    felt = 2.0 * extent(places) * float(np.median(swings))
     if felt > NOTICEABLE_LOAD:
         warnings.warn(
             "sampled: the curvature goes up and down from point to point (it changes between rising and falling at "
-            f"{len(swings)} of {len(steps) - 1} places), and loads with it, by about {felt:.2g} g where a body is "
+            f"{len(swings)} of {len(alternate)} places), and loads with it, by about {felt:.2g} g where a body is "
             f"fast: the points scatter, or are too far apart; {remedy}",
             NoisyPointsWarning,
             stacklevel=5,
