@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import nan
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,23 +54,32 @@ def least_squares_between(
 def _with_moved(
     residuals: Function, jacobian: Function, x: Array, low: Array, high: Array, moves: NDArray[np.bool_]
 ) -> Array:
-    """Return the unknowns with the least sum of squares if only some of them move."""
+    """Return the unknowns with the least sum of squares if only some of them move.
+
+    SciPy's tolerances are those of numbers near one. So it is given each unknown by what the residuals owe to it, and
+    the residuals by the largest of these, or by their size where that is larger. These units are powers of two, and
+    nothing is rounded.
+    """
     from scipy.optimize import least_squares
+
+    owed = np.linalg.norm(jacobian(x)[:, moves], axis=0)
+    unit = _power_of_two(max(np.linalg.norm(residuals(x)), np.max(np.abs(x[moves]) * owed)))
+    units = unit / _power_of_two(owed)
 
     def all_of(some: Array) -> Array:
         moved = x.copy()
-        moved[moves] = some
+        moved[moves] = some * units
         return moved
 
     found = least_squares(
-        lambda some: residuals(all_of(some)),
-        x[moves],
-        jac=lambda some: jacobian(all_of(some))[:, moves],
-        bounds=(low[moves], high[moves]),
+        lambda some: residuals(all_of(some)) / unit,
+        x[moves] / units,
+        jac=lambda some: jacobian(all_of(some))[:, moves] * (units / unit),
+        bounds=(low[moves] / units, high[moves] / units),
         x_scale="jac",
-        xtol=1e-12,
+        xtol=1e-15,
         ftol=1e-14,
-        gtol=1e-14,
+        gtol=1e-15,
         max_nfev=MAX_STEPS,
     )
     x = all_of(found.x)
@@ -78,6 +88,11 @@ def _with_moved(
             f"fit: no minimum was found within {MAX_STEPS} steps; begin nearer than at {short(x.tolist())}"
         )
     return x
+
+
+def _power_of_two(size: Any) -> Any:
+    """Return the powers of two next to sizes; one for zero."""
+    return np.exp2(np.rint(np.log2(np.where(size > 0.0, size, 1.0))))
 
 
 def _limits_at(off: Array, slopes: Array, x: Array, low: Array, high: Array) -> Array:

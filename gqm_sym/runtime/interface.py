@@ -220,6 +220,9 @@ class Dissipation(NamedTuple):
         Whether it has a kink where the curvature changes sign. A leg is then computed in parts.
     linear : bool
         Whether it is linear in V**2.
+    has_radius : bool
+        Whether the body rolls and has a radius. Where it does not fit into its track, ds/dlam is negative; where it
+        only just fits, the contact force varies over shorter distances than ds/dlam and the force along the path.
     squared_contact : int
         The memory cell with the address of this function; 0 if there is none.
     path_in_space : int
@@ -231,6 +234,7 @@ class Dissipation(NamedTuple):
     friction: bool
     kinked: bool
     linear: bool
+    has_radius: bool
     squared_contact: int
     path_in_space: int
 
@@ -245,11 +249,12 @@ class DissipativeFunctions(NamedTuple):
     linear: bool
     squared_contact: Any = None
 
-    def addresses(self) -> Dissipation:
+    def addresses(self, *, has_radius: bool) -> Dissipation:
         """Return the memory cells with their addresses, and the flags."""
         speed_equation, static_balance = _addresses(self[:2])
         squared_contact = self.squared_contact.address if self.squared_contact else 0
-        return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear, squared_contact, 0)
+        flags = self.friction, self.kinked, self.linear, has_radius
+        return Dissipation(speed_equation, static_balance, *flags, squared_contact, 0)
 
 
 class SeparatedTerms(NamedTuple):

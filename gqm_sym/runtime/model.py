@@ -261,9 +261,7 @@ class CompiledModel(Formulas):
             raise
         if motion.kind not in ("libration", "circulation"):  # the search for the ends of these has proved that ds > 0
             rolling.check_launch(self, f, lam0)
-            rolling.check_end(self, motion.legs)
-            if self.dissipation is not None:
-                rolling.check_joints(self, f, motion.legs)
+            rolling.check_end(self, f, motion.legs)
         return motion
 
     def sweep(

@@ -150,7 +150,7 @@ class Loss:
     """The compiled functions of a dissipative module, called by address as the runtime calls them."""
 
     def __init__(self, module: ModuleType, values: dict[str, str]) -> None:
-        self.dissipation = module.MODEL.dissipation.addresses()
+        self.dissipation = module.MODEL.dissipation.addresses(has_radius=False)
         given = module.PARAMETERS | values
         self.p = np.array([n.value for n in module.MODEL.numbers(tuple(given.values()))])
 

@@ -12,7 +12,7 @@ import pint
 import pytest
 from paths import ROOT
 from scipy.optimize import brentq
-from scipy.special import ellipk
+from scipy.special import ellipj, ellipk
 
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, SolutionError
@@ -69,6 +69,19 @@ def test_data_without_noise_are_met(pendulum: ModuleType) -> None:
     data = {"t": t, "lam": pendulum.solve(0.8, 0.3, L=1.3).lam(t)}
     found = gqm.fit(pendulum, data, {"L": 1.2, "lam0": 0.7, "v0": (0, 1)})
     assert found.estimates == pytest.approx({"L": 1.3, "lam0": 0.8, "v0": 0.3}, rel=1e-12)
+
+
+def test_measurements_in_nanometres(pendulum: ModuleType) -> None:
+    """Measurements that are small numbers are met like others."""
+    length, amplitude = 2e-9, 0.3
+    k, rate = np.sin(amplitude / 2), (9.81 / length) ** 0.5
+    t = np.linspace(0.1, 12.0, 15) / rate
+    swing = 2.0 * np.arcsin(k * ellipj(ellipk(k * k) - rate * t, k * k)[0])
+    data = {"t": t, "x": length * np.sin(swing), "lam": swing}
+    for name in ("x", "lam"):
+        free = {"L": (0.0, 0.99 * length, 2.0 * length), "lam0": (0.0, 1.01 * amplitude, 1.0)}
+        found = gqm.fit(pendulum, {"t": t, name: data[name]}, free)
+        assert found.estimates == pytest.approx({"L": length, "lam0": amplitude}, rel=1e-12, abs=0.0)
 
 
 def test_periods_against_the_complete_elliptic_integral(pendulum: ModuleType) -> None:

@@ -14,6 +14,9 @@ name                                what it is used for                  what is
 ``compiler.Compiler``               into machine code by themselves
 ``get_call_template`` of a          one version of a function for all    one for each: the first compilation takes
 dispatcher                          integers that are written in calls   a sixth longer
+``get_call_type`` and               what numba's own functions return    it is looked for at each call: the first
+``_impl_keys`` of                   for arguments of some types is       compilation takes a seventh longer
+``types.Function``                  looked for once
 ``runtime.rtsys``                   code from the cache runs without     the preparation: 0.4 s longer
                                     numba's preparation
 ``environment.Environment``,        code from the cache is read          reading imports them: 0.2 s longer
@@ -77,6 +80,7 @@ HAS_CACHE = _has(FunctionCache, "load_overload", "save_overload", "_load_overloa
 HAS_CALLBACKS = _has(ccallback, "CFunc") and _has(ccallback.CFunc, "_targetdescr")
 HAS_ENVIRONMENTS = _has(Environment, "_memo")
 HAS_RUNTIME = _has(rtsys, "initialize")
+HAS_RESOLUTION = _has(types.Function, "get_call_type", "get_impl_key")
 HAS_LIBRARIES = (
     HAS_CACHE
     and HAS_RUNTIME
@@ -196,6 +200,41 @@ def _libraries(codegen: Any, kind: Any) -> Iterator[None]:
         codegen._library_class = before
 
 
+# What numba's own functions, such as the sum of two numbers, were found to return for arguments of some types: the
+# function itself, so that no other has its identity, the signature, and the key of the version that is called.
+_RESOLVED: dict[tuple[Any, ...], tuple[Any, Any, Any]] = {}
+_SEARCH = getattr(types.Function, "get_call_type", None)
+
+
+def _resolve(function: Any, context: Any, arguments: Any, keywords: Any) -> Any:
+    """Return the signature of the version of a function that fits arguments of some types, and note its key."""
+    if keywords:
+        return _SEARCH(function, context, arguments, keywords)  # type: ignore[misc]
+    given = (id(function), context, *arguments)
+    if given not in _RESOLVED:
+        signature = _SEARCH(function, context, arguments, keywords)  # type: ignore[misc]
+        _RESOLVED[given] = (function, signature, function._impl_keys[signature.args])
+    _, signature, function._impl_keys[signature.args] = _RESOLVED[given]
+    return signature
+
+
+@contextmanager
+def _resolved_once() -> Iterator[None]:
+    """Have numba look once for the version of each of its own functions that fits arguments of some types.
+
+    It looks at each call, twice for each function that it compiles, and for a sum of numbers among versions for arrays
+    too.
+    """
+    before = _SEARCH
+    if HAS_RESOLUTION:
+        before, types.Function.get_call_type = types.Function.get_call_type, _resolve
+    try:
+        yield
+    finally:
+        if HAS_RESOLUTION:
+            types.Function.get_call_type = before
+
+
 class CallbackPipeline(Pipeline):  # type: ignore[misc]
     """numba's steps of compilation, for a function that is called by its address."""
 
@@ -204,7 +243,7 @@ class CallbackPipeline(Pipeline):  # type: ignore[misc]
 
     def compile_extra(self, function: Any) -> Any:
         """Compile a function; those of numba's own that it calls are only linked."""
-        with _libraries(self.state.targetctx.codegen(), LinkedLibrary):
+        with _libraries(self.state.targetctx.codegen(), LinkedLibrary), _resolved_once():
             return super().compile_extra(function)
 
     def define_pipelines(self) -> Any:

@@ -41,7 +41,7 @@ def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
     """Return the bound functions that all launches with these parameters share."""
     if p.functions is None:
         addresses, losses = formulas.functions.addresses(), formulas.dissipation
-        dissipation = None if losses is None else losses.addresses()
+        dissipation = None if losses is None else losses.addresses(has_radius=bool(formulas.rolling_radius))
         mass = float(p.values[list(formulas.parameters).index("m")])
         p.functions = BoundFunctions(addresses, p.values, dissipation=dissipation, mass=mass)
         if formulas.chart is not None:

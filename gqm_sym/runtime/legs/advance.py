@@ -92,7 +92,7 @@ from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
 # has left the range of doubles.
 END_REST, END_LIFTOFF_AT_ONCE, END_OUT_OF_DOMAIN, END_OVERFLOW = range(10, 14)
 
-DISSIPATION = types.NamedTuple((INTEGER, INTEGER, *(types.boolean,) * 3, INTEGER, INTEGER), Dissipation)
+DISSIPATION = types.NamedTuple((INTEGER, INTEGER, *(types.boolean,) * 4, INTEGER, INTEGER), Dissipation)
 
 # The width of the first panel as a share of the first step of a search. The narrower it is, the more digits early times
 # have.

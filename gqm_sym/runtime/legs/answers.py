@@ -116,7 +116,8 @@ class Track(NamedTuple):
 @Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """Return the answer for one body with its status."""
-    findings = Findings(inf, -inf)
+    # A body is at once where it is launched.
+    findings = Findings(0.0 if question == ARRIVAL and body[TARGET] == body[LAM0] else inf, -inf)
     function, sign = sought_extreme(question)
     has_vector = function == LENGTH and dissipation.path_in_space != 0
     has_length = has_vector or (function == LENGTH and dissipation.squared_contact != 0)
@@ -130,16 +131,15 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
         # For a run without room for a panel, `solve` decides whether the curve or the arithmetic ends there.
         if what in (END_RECORD_FULL, END_TOO_MANY_PANELS, END_TOO_NARROW, END_OUT_OF_DOMAIN, END_OVERFLOW):
             break
-        if question == ARRIVAL and body[TARGET] == body[LAM0]:
-            return 0.0, FOUND
         if dissipation.friction and slides_little(dissipation, p, joints, record, body):
             break
         findings = after_leg(dissipation, p, body, question, findings, record)
+        reads = TIMES if question == ARRIVAL and findings.arrival < inf else reads
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
             break
         passed = question >= LEAST_SPEED and body[HORIZON] == inf
         passed = passed and has_passed(dissipation, p, joints.breaks, body, question, findings.peak, record)
-        if not goes_on(body, question, findings.arrival, passed):
+        if not goes_on(body, question, findings.arrival, passed, dissipation.has_radius):
             is_at_limit = question >= LEAST_LOAD and body[ENDING] == END_LIMIT
             if is_at_limit and force_is_unbounded(dissipation, p, body, findings.peak):
                 break

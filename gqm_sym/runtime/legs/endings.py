@@ -74,11 +74,16 @@ def check_fall(problem: Problem, record: Array, v2: float, elapsed: float) -> No
 
 
 def cusp_ahead(problem: Problem, record: Array) -> float:
-    """Return the place of a cusp close ahead of the end of a run, which takes less than a rounding of the time."""
+    """Return the place of a cusp close ahead of the end of a run, which takes less than a rounding of the time.
+
+    If ds/dlam jumps to a negative value at a joint, behind which a body with a radius does not fit, that is the place.
+    """
     f, place, heading = problem.functions, float(record[END]), int(record[HEADING])
     near = 0.01 * NEAR_CUSP * starting_step(problem)
     places = place - heading * near * np.array([0.0, 1.0, 2.0])
     ds = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
+    if not ds[0] > 0.0:
+        return place
     slope, second = (4.0 * ds[1] - 3.0 * ds[0] - ds[2]) / (2.0 * near), (ds[0] - 2.0 * ds[1] + ds[2]) / near**2
     distance = float(ds[0] / slope)
     return place + heading * distance * (1.0 + float(0.5 * second / slope) * distance)

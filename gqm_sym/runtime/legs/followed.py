@@ -2,8 +2,10 @@
 begin.
 """
 
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from copy import copy
+from functools import partial
 from math import inf, isfinite
 
 import numpy as np
@@ -73,11 +75,11 @@ class FollowedMotion(Tabulated, Motion):
             if driver.ending or driver.number(PAUSES) >= MAX_PAUSES:
                 return None
             self._follow_next()
-        segments = self._trajectory(0.0).segments
-        ends = [k for k, timed in enumerate(segments) if timed.end == "turn"]
+        segments = self._lay(lambda laid: len(_turns_of(laid)) >= turns)
+        ends = _turns_of(segments)
         if len(ends) < turns:
             return None
-        return Trajectory(segments=segments[: ends[turns - 1] + 1], lap=self.problem.period)
+        return Trajectory(segments=tuple(segments[: ends[turns - 1] + 1]), lap=self.problem.period)
 
     def _history(self) -> tuple[TimedSegment, ...]:
         self._look_ahead()
@@ -120,13 +122,18 @@ class FollowedMotion(Tabulated, Motion):
     def _first_passages(self, lam: float, low: float) -> list[float]:
         done, driver = 0, self._driver
         while True:
-            trajectory = self._trajectory(0.0)
-            found = passages(trajectory.segments[done:], trajectory, lam, low)
-            done = len(trajectory.segments)
+            segments = tuple(self._lay(partial(_are_more, than=done)))
+            if len(segments) > done:
+                trajectory = Trajectory(segments=segments, lap=self.problem.period)
+                found = passages(segments[done:], trajectory, lam, low)
+                if found:
+                    return found
+                done = len(segments)
+                continue
             # A body that has turned at two points reaches no place outside of them any more.
             settled = driver.number(TURNS) >= (1.0 if self.problem.w0 == 0.0 else 2.0)
-            if found or driver.ending or settled or driver.elapsed >= self._horizon:
-                return found
+            if driver.ending or settled or driver.elapsed >= self._horizon:
+                return []
             self._follow_next()
 
     # -- leg after leg ------------------------------------------------------------------------
@@ -144,11 +151,33 @@ class FollowedMotion(Tabulated, Motion):
     @property
     def _pieces(self) -> list[TimedSegment]:
         """All segments so far."""
-        self._follow_again()
-        for run in self._driver.runs.all():
-            self._layout.lay(run)
-        self._driver.runs.replace([])
-        return self._layout.segments
+        return self._lay(lambda _: False)
+
+    def _pieces_up_to(self, t: float) -> Sequence[TimedSegment]:
+        return self._lay(lambda laid: bool(laid) and laid[-1].t_stop[0] > t)
+
+    def _lay(self, are_enough: Callable[[list[TimedSegment]], bool]) -> list[TimedSegment]:
+        """Return the segments from launch. Of the runs so far, as many are laid as are needed for enough segments."""
+        layout, runs, done = self._layout, self._driver.runs.all(), 0
+        try:
+            while done < len(runs) and not are_enough(layout.segments):
+                for part in self._in_parts(runs[done], len(layout.runs)):
+                    layout.lay(part)
+                done += 1
+        finally:
+            self._driver.runs.replace(runs[done:])
+        return layout.segments
+
+    def _in_parts(self, run: Run, number: int) -> list[Run]:
+        """Return a run with panels, for which it is followed once more if it has none, in as many parts as necessary;
+        ``number`` is that of the runs before it.
+        """
+        if run.has_panels:
+            return [run]
+        parts = self._driver.with_panels(run)
+        if number < self._runs_to_turn:
+            self._runs_to_turn += len(parts) - 1
+        return parts
 
     @property
     def _all_runs(self) -> list[Run]:
@@ -249,16 +278,20 @@ class FollowedMotion(Tabulated, Motion):
 
     def _follow_again(self) -> None:
         """Follow the runs without panels once more for their panels, each in as many parts as necessary."""
-        known, runs = self._driver.runs.all(), list[Run]()
-        if all(run.has_panels for run in known):
-            return
-        for run in known:
-            parts = self._driver.with_panels(run)
-            if len(self._layout.runs) + len(runs) < self._runs_to_turn:
-                self._runs_to_turn += len(parts) - 1
-            runs += parts
+        runs = list[Run]()
+        for run in self._driver.runs.all():
+            runs += self._in_parts(run, len(self._layout.runs) + len(runs))
         self._driver.runs.replace(runs)
 
     def _is_ahead(self, places: Array) -> bool:
         """Return whether one of the places lies ahead of the part that has been computed."""
         return bool(np.any((places - self._driver.reached) * self._driver.number(DIRECTION) > 0.0))
+
+
+def _turns_of(segments: Sequence[TimedSegment]) -> list[int]:
+    """Return the numbers of the segments that end at turns."""
+    return [k for k, timed in enumerate(segments) if timed.end == "turn"]
+
+
+def _are_more(segments: Sequence[TimedSegment], than: int) -> bool:
+    return len(segments) > than

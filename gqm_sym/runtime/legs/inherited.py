@@ -81,7 +81,8 @@ class InheritedErrors:
         if timed.segment.v2 is not None:  # the approach to an equilibrium
             return after.place, np.full_like(phi, after.time)
         of_frame = 0.0 if run.frame is None else self._errors_of(run.frame)[0]
-        swing = 2.0 * self._driver.last_swing if timed.leg == len(self._runs) - 1 else 0.0
+        is_last = timed.leg == len(self._runs) - 1 and not len(self._driver.runs)
+        swing = 2.0 * self._driver.last_swing if is_last else 0.0
         if swing and run.what != END_ASYMPTOTE:
             # The error of so small a V**2 may be below the range of doubles, but the body stays where it is.
             return before.place + of_frame + swing, np.zeros_like(phi)

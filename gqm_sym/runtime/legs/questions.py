@@ -148,16 +148,25 @@ def has_passed(dissipation, p, breaks, body, question, peak, record):  # type: i
 
 
 @Inner
-def goes_on(body, question, arrival, passed):  # type: ignore[no-untyped-def]
-    """Return whether the next leg has to be followed too; ``passed`` is what `has_passed` returns."""
-    if body[ENDING] != 0.0 or arrival < inf:
+def is_confined(body):  # type: ignore[no-untyped-def]
+    """Return whether a body has turned at two points, and reaches no place outside of them any more."""
+    return body[TURNS] >= (1.0 if body[FROM_REST] else 2.0)
+
+
+@Inner
+def goes_on(body, question, arrival, passed, has_radius):  # type: ignore[no-untyped-def]
+    """Return whether the next leg has to be followed too; ``passed`` is what `has_passed` returns.
+
+    A body with a radius is followed after its arrival too, up to where it can reach no other place, because motions to
+    where it does not fit into its track are refused.
+    """
+    if body[ENDING] != 0.0 or (question == ARRIVAL and is_confined(body)):
         return False
-    # A body that has turned at two points reaches no place outside of them any more.
-    if question == ARRIVAL and body[TURNS] >= (1.0 if body[FROM_REST] else 2.0):
+    if arrival < inf and (not has_radius or body[LAPS] != 0.0):
         return False
     if isfinite(body[HORIZON]):
         return body[ELAPSED] < body[HORIZON]
-    if question == ARRIVAL:
+    if question == ARRIVAL and not arrival < inf:
         return True
     if question >= LEAST_SPEED and dies_away(body):
         return not passed and body[TURNS] < MOST_SWINGS
@@ -202,7 +211,7 @@ def after_leg(dissipation, p, body, question, findings, record):  # type: ignore
     """Return the findings of the legs so far after one more leg."""
     begin, low = record[BEGIN], record[BEGIN_LOW]
     if question < LEAST_SPEED:
-        if question != ARRIVAL or body[ENDING] == END_LIFTOFF_AT_ONCE:
+        if question != ARRIVAL or findings.arrival < inf or body[ENDING] == END_LIFTOFF_AT_ONCE:
             return findings
         spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
         return Findings(begin + (low + spent), findings.peak)
@@ -221,7 +230,9 @@ def after_leg(dissipation, p, body, question, findings, record):  # type: ignore
 
 @Inner
 def fits(dissipation, p, body):  # type: ignore[no-untyped-def]
-    """Return whether a rolling body fits into its track at the launch: ds/dlam is negative where it does not."""
+    """Return whether a body fits into its track at the launch: ds/dlam is negative where one with a radius does not."""
+    if not dissipation.has_radius:
+        return True
     point = point_buffer()
     slope_of_v2(forces_on(dissipation, p, 1), body[LAM0], body[V2], 0, point)
     return point[2] > 0.0

@@ -244,6 +244,8 @@ def corner_crossings(timed: TimedSegment, corners: Array, time_scale_error: floa
 
     In motions with losses, segments end at corners, and the body passes to the next segment.
     """
+    if not corners.size:
+        return []
     segment, f = timed.segment, timed.segment.functions
     places = f.between(corners, segment.a, segment.b)
     phi = np.array([segment.phase_angle_of(*segment.offsets(place)) for place in places])

@@ -88,6 +88,8 @@ class Quantity(NamedTuple):
         Whether its square is a quadratic polynomial of V**2 at each place, as that of a contact force in space.
     is_even : bool
         Whether it is known to be the same for both directions of motion at each place.
+    grows_with_speed : bool
+        Whether it is at each place the larger, the faster the body is, and the same wherever the body stands still.
     """
 
     at: Callable[..., Array]
@@ -96,6 +98,7 @@ class Quantity(NamedTuple):
     is_quadratic: bool = True
     is_length: bool = False
     is_even: bool = False
+    grows_with_speed: bool = False
 
 
 def _speeds(timed: TimedSegment, phi: Array, share: float = 1.0) -> Array:
@@ -103,7 +106,7 @@ def _speeds(timed: TimedSegment, phi: Array, share: float = 1.0) -> Array:
 
 
 # |ds/dt| in m/s.
-SPEED = Quantity(_speeds, lambda state: abs(state.v), is_even=True)
+SPEED = Quantity(_speeds, lambda state: abs(state.v), is_even=True, grows_with_speed=True)
 
 
 def force_of(problem: "Problem") -> Quantity:
@@ -193,7 +196,8 @@ def _on_segment(
 
     def signed(angles: Array) -> Array:
         values = sign * quantity.at(timed, angles)
-        values[np.abs(angles - stop) < clear] = limit
+        if stops_at_cusp:
+            values[np.abs(angles - stop) < clear] = limit
         return np.where(np.isnan(values), -np.inf, values)
 
     at_cusp = -1 if stop > start else 0

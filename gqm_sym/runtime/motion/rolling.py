@@ -1,5 +1,6 @@
 """Rolling bodies: whether static friction is sufficient, and whether the body fits into its track."""
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.launch.problem import Problem
 
 
-# The distance from a joint at which its sides are told apart, in roundings of places along the curve.
+# The distance from a joint at which the track behind it is looked at, in roundings of the place.
 ROUNDINGS_BESIDE = 2.0**12
 
 
@@ -69,35 +70,16 @@ def check_launch(formulas: "Formulas", f: BoundFunctions, lam0: float) -> None:
         raise LaunchError(f"lam0: {_what(formulas, lam0)}; launch elsewhere, or {_remedy(formulas)}")
 
 
-def narrow_joints(f: BoundFunctions) -> Array:
-    """Return the joints of a charted curve's pieces next to which the body does not fit into the track."""
-    joints = f.breaks
-    if not joints.size:
-        return joints
-    beside = ROUNDINGS_BESIDE * np.spacing(np.abs(joints).max())
-    places = np.concatenate([joints - beside, joints + beside])
-    ds = path_and_force_at(f.addresses, f.p, places, np.zeros(places.size))[2].reshape(2, -1)
-    narrow: Array = joints[~(ds > 0.0).all(axis=0)]
-    return narrow
-
-
-def check_joints(formulas: "Formulas", f: BoundFunctions, legs: Sequence[Leg]) -> None:
-    """Refuse a motion with losses past a joint behind which the track is too narrow for the body.
-
-    On curves with formulas the path of the body's centre has a cusp there, at which the motion ends.
+def check_end(formulas: "Formulas", f: BoundFunctions, legs: Sequence[Leg]) -> None:
+    """Refuse a motion to a place where the body no longer fits: the path of its centre has a cusp there, or turns back
+    at a joint of the track's pieces.
     """
-    narrow = narrow_joints(f)
-    for leg in legs if narrow.size else ():
-        passed = narrow[(narrow > min(leg.lam_start, leg.lam_end)) & (narrow < max(leg.lam_start, leg.lam_end))]
-        if passed.size:
-            first = passed[np.argmin(np.abs(passed - leg.lam_start))]
-            raise SolutionError(f"{_what(formulas, float(first))}, where it comes; {_remedy(formulas)}")
-
-
-def check_end(formulas: "Formulas", legs: Sequence[Leg]) -> None:
-    """Refuse a motion to a place where the body no longer fits, because the path of its centre has a cusp there."""
     last = legs[-1] if legs else None
-    if last is not None and last.end == "cusp":
+    if last is None or last.end not in ("cusp", "singular-point"):
+        return
+    beyond = math.copysign(ROUNDINGS_BESIDE * math.ulp(last.lam_end), last.lam_end - last.lam_start)
+    ds = path_and_force_at(f.addresses, f.p, np.array([last.lam_end + beyond]), np.zeros(1))[2, 0]
+    if last.end == "cusp" or not ds > 0.0:
         what = f"{_what(formulas, last.lam_end)}, where it comes after {last.t_end!r} s"
         raise SolutionError(f"{what}; {_remedy(formulas)}")
 

@@ -50,11 +50,6 @@ QUESTIONS = {
     "normal_force_max": questions.MOST_LOAD,
 }
 
-# The quantities of rolling bodies on curves with formulas. For others `solve` follows the bodies to the end, since they
-# may come to where they do not fit into the track; and panels do not resolve the contact force where the path of the
-# centre is narrowly bent. Along charts a track may be too narrow behind a joint, which only `solve` checks.
-OF_ROLLING_BODIES = ("t_end", "rest_position", "v_min", "v_max")
-
 
 class Question(NamedTuple):
     """The question for all bodies.
@@ -102,8 +97,6 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
     if loss is None or quantity not in QUESTIONS:
         return None
     question = QUESTIONS[quantity]
-    if formulas.rolling_radius and (formulas.chart is not None or quantity not in OF_ROLLING_BODIES):
-        return None
     if quantity.startswith("normal_force") and not formulas.signed:
         if not is_length_known(formulas):
             return None
@@ -135,7 +128,7 @@ def answer_driven(
         Filled in for this part.
     """
     assert formulas.dissipation is not None
-    dissipation = formulas.dissipation.addresses()
+    dissipation = formulas.dissipation.addresses(has_radius=bool(formulas.rolling_radius))
     if asked.question >= questions.LEAST_LENGTH and is_read_from_vector(formulas):
         assert formulas.path_in_space is not None
         dissipation = dissipation._replace(path_in_space=formulas.path_in_space.address)

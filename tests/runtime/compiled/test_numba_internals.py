@@ -12,7 +12,10 @@ from paths import ROOT
 
 # These are all private names that `numba_internals` uses: those that it imports, and attributes of these.
 IMPORTED = ("FunctionCache", "IndexDataCacheFile", "ccallback", "Environment", "lookup_environment", "rtsys")
-ATTRIBUTES = ("_load_overload", "_index_key", "_save_data", "CFunc", "_memo", "initialize", "entry_point", "_cache")
+ATTRIBUTES = (
+    *("_load_overload", "_index_key", "_save_data", "CFunc", "_memo", "initialize", "entry_point", "_cache"),
+    *("get_call_type", "get_impl_key"),
+)
 LIBRARIES = (
     *("JITCodeLibrary", "JITCPUCodegen", "Compiler", "get_call_template", "_optimize_functions"),
     *("_optimize_final_module", "_finalize_final_module", "_finalize_specific", "_finalize_dynamic_globals"),
@@ -21,7 +24,7 @@ LIBRARIES = (
 ALL = (*IMPORTED, *ATTRIBUTES, *LIBRARIES)
 
 # One name of each feature is missing alone; other names, which the same features need, in pairs of two features.
-ALONE = ("FunctionCache", "ccallback", "Environment", "rtsys", "entry_point", "_cache")
+ALONE = ("FunctionCache", "ccallback", "Environment", "rtsys", "entry_point", "_cache", "get_call_type")
 PAIRS = (
     *(("IndexDataCacheFile", "CFunc"), ("_load_overload", "lookup_environment")),
     *(("_index_key", "_memo"), ("_save_data", "initialize")),

@@ -94,6 +94,21 @@ def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> No
 
 
 @pytest.mark.extended
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("v0", [9.5, 13])
+def test_first_legs_of_a_swing_that_dies_away(v0: float, tmp_path: Path) -> None:
+    """After some laps a pendulum swings within its earlier swings, which have all extremes, and only they are read."""
+    circle = gqm.derive(gqm.families.circle(L=1), gqm.Gravity() + gqm.QuadraticDrag())
+    motion = gqm.build(circle, name="laps_then_swings", folder=tmp_path).solve("pi/3", v0, b=0.05, t_max=25)
+    speeds, forces = (motion.v_min.value, motion.v_max.value), (motion.normal_force_min.value, motion.normal_force_max)
+    assert len(motion._layout.runs) < len(motion.legs) / 2
+    state = motion.state(np.r_[np.linspace(0, 8, 401), np.linspace(8, 25, 50)])
+    assert speeds == (0.0, v0)
+    assert forces[0] <= state.normal_force.min()
+    assert forces[0] == pytest.approx(state.normal_force.min(), abs=0.05)
+    assert forces[1] == (pytest.approx(9.81 * cos(pi / 3) + v0**2, rel=1e-14), 0.0, pytest.approx(pi / 3, rel=1e-15))
+
+
 def test_a_bend_that_is_shorter_than_steps_of_a_grid() -> None:
     """At the rounded edge of a valley N agrees with its formula (sweeps returned a 300th of it, from a grid too
     coarse).

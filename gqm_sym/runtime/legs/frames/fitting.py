@@ -237,7 +237,8 @@ def frame_near(
         row[TERMS:] = _divided(fit.powers[k], (row[ORIGIN] - row[CENTRE]) / half) / half
     speed_equation, static_balance = frame_functions()
     friction = dissipation.friction
-    functions = Dissipation(speed_equation.address, static_balance.address, friction, False, dissipation.linear, 0, 0)
+    flags = friction, False, dissipation.linear, False
+    functions = Dissipation(speed_equation.address, static_balance.address, *flags, 0, 0)
     addresses = float(dissipation.speed_equation), float(dissipation.static_balance) if friction else 0.0
     head = [*addresses, middle, low, size, float(len(rows))]
     frame = Frame(functions, np.array([*head, *rows.ravel(), *p]), 0.0, sense=sense)

@@ -66,6 +66,7 @@ from gqm_sym.runtime.legs.panels.resolution import (
     ONE_SIGN_RATIO,
     are_resolved,
     examine,
+    fits,
     is_curve_resolved,
     kink,
     size_at,
@@ -278,7 +279,7 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
     work[size_at(FORCE)] = max(size_of(work, FORCE), NOISE_OF_FORCE * size_of(work, N0))
     if not (is_curve_resolved(width, work)[0] and are_resolved(work, FORCE, Q_RATE)[0]):
         return
-    if forces.kinked and not kink(work) > 1.0:
+    if (forces.kinked and not kink(work) > 1.0) or not fits(forces, work):
         return
     for row in (N0, KAPPA):
         if not examine(work, row, size_of(work, row))[0] <= ONE_SIGN_RATIO * size_of(work, row):

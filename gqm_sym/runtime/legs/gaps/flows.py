@@ -149,7 +149,7 @@ def travel(forces, route, march, v2, first, way, contact_sign, work):  # type: i
         stop, is_passed = marched(passed, march), False
         for _ in range(PANELS_ON_GAP):
             panel, rest = Panel(left, v2, contact_sign, (low + off, high - off)), stop - left
-            request = PanelRequest(rest, rest, of_v2[1], ALWAYS, True, False)
+            request = PanelRequest(rest, rest, of_v2[1], ALWAYS, True, False, False)
             width, _step, timed = next_panel(forces, march, panel, request, work)
             if width == 0.0 or not timed:
                 return failed

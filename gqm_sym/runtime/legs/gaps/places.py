@@ -21,8 +21,9 @@ from gqm_sym.runtime.legs.panels.equation import (
     product,
 )
 from gqm_sym.runtime.legs.panels.polynomials import size_of
-from gqm_sym.runtime.legs.panels.resolution import examine
+from gqm_sym.runtime.legs.panels.resolution import examine, fits
 from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_nonlinear
+from gqm_sym.runtime.legs.panels.widest import is_force_resolved
 
 
 @Inlined
@@ -49,5 +50,7 @@ def solve_on_places(forces, v2, width, contact_sign, gaps, at, work):  # type: i
     copy_row(work, D, OFFSET)
     march, panel = March((0.0, 0.0), forces.direction, 0.0, 1.0), Panel(0.0, v2, contact_sign, (-inf, inf))
     if not solve_nonlinear(forces, march, panel, nan, work) < inf:
+        return False
+    if forces.has_radius and not (fits(forces, work) and is_force_resolved(forces, march, panel, False, work)[0]):
         return False
     return examine(work, FORCE, size_of(work, FORCE))[2]

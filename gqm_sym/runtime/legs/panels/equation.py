@@ -122,7 +122,7 @@ class Forces(NamedTuple):
         The address of the module's compiled function of this name.
     params : array
         Run-time parameters.
-    friction, kinked, linear : bool
+    friction, kinked, linear, has_radius : bool
         As in `interface.Dissipation`.
     direction : int
         The sign of dlam/dt.
@@ -135,6 +135,7 @@ class Forces(NamedTuple):
     friction: bool
     kinked: bool
     linear: bool
+    has_radius: bool
     direction: int
     squared_contact: int
     path_in_space: int
@@ -149,6 +150,7 @@ def forces_on(dissipation, p, direction):  # type: ignore[no-untyped-def]
         dissipation.friction,
         dissipation.kinked,
         dissipation.linear,
+        dissipation.has_radius,
         direction,
         dissipation.squared_contact,
         dissipation.path_in_space,

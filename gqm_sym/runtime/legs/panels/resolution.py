@@ -208,6 +208,12 @@ def first_change_of(work, row, sign, noise):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def fits(forces, work):  # type: ignore[no-untyped-def]
+    """Return whether a body with a radius fits into its track all along a panel."""
+    return not forces.has_radius or first_change_of(work, DS, 1, 0.0)[0] > 1.0
+
+
+@Inner
 def kink(work):  # type: ignore[no-untyped-def]
     """Return the place x where the curvature changes sign; 2 if it does not, -1 if that is not resolved.
 

@@ -21,6 +21,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     distance,
     fill_length,
     fill_rates,
+    load_per_mass_row,
     load_row,
     product,
     slope_at,
@@ -28,9 +29,11 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, size_of
 from gqm_sym.runtime.legs.panels.resolution import (
+    CANCELLATION_NOISE,
     are_resolved,
     examine,
     first_jump,
+    fits,
     growth,
     growth_towards,
     is_curve_resolved,
@@ -53,8 +56,8 @@ MIN_RELATIVE_WIDTH = 1e-15
 # to lie ahead.
 TURNING_RATIO = 10.0
 
-# The largest share of the last coefficients of the square of the contact force, if its extremes are read.
-LENGTH_TAIL = 2e-14
+# The largest share of the last coefficients of the contact force, or of its square, if its extremes are read.
+FORCE_TAIL = 2e-14
 
 # The ratio of V**2 at a panel's end to the largest V**2 so far above which time is resolved. Below it a turn is
 # expected, and time is counted from there.
@@ -98,8 +101,9 @@ class PanelRequest(NamedTuple):
         largest at both ends.
     resolve_load : bool
         Whether N must be resolved as far as its changes of sign require.
-    resolve_length : bool
-        Whether the square of the length of the contact force must be resolved, as its extremes require.
+    resolve_force, resolve_length : bool
+        Whether the contact force, or the square of its length, must be resolved, as its extremes require. The former
+        holds without a test unless the body has a radius.
     """
 
     max_width: float
@@ -107,13 +111,13 @@ class PanelRequest(NamedTuple):
     largest_v2: float
     timing: int
     resolve_load: bool
+    resolve_force: bool
     resolve_length: bool
 
 
 @Inner
 def resolve_time(forces, march, panel, request, largest_v2, worst, is_tiny_part, work):  # type: ignore[no-untyped-def]
-    """Decide whether a panel resolves time, and the length of the contact force if that is read, as far as that is
-    required.
+    """Decide whether a panel resolves time, and the contact force if that is read, as far as that is required.
 
     ``worst`` is the ratio of middle coefficients of the other functions. If the panel is a very small part of a smooth
     one (``is_tiny_part``), only noise is unresolved, which the error of the time includes.
@@ -131,21 +135,20 @@ def resolve_time(forces, march, panel, request, largest_v2, worst, is_tiny_part,
     top, end, factor = max(request.largest_v2, largest_v2), work[W + COUNT], growth(worst)
     is_high = end >= HIGH_V2_RATIO * top or panel.v2 < HIGH_V2_RATIO * top
     needed = request.timing == ALWAYS or (request.timing == MAYBE and is_high)
-    timed, ratio = False, 0.0
+    timed, ratio, of_force = False, 0.0, 0.0
     if request.timing != NEVER:
         fill_rates(march, panel, work)
         work[size_at(TIME_RATE)] = size_of(work, TIME_RATE)
         timed, ratio = are_resolved(work, TIME_RATE, LOAD)
-        if timed and request.resolve_length:  # in a rotating frame that depends on V, as time does
-            timed, of_length = is_length_resolved(forces, march, panel, work)
-            ratio = max(ratio, of_length)
+        if timed and (request.resolve_length or (request.resolve_force and forces.has_radius)):
+            timed, of_force = is_force_resolved(forces, march, panel, request.resolve_length, work)
     timed = timed or (needed and is_tiny_part and work[TAILS] < inf)
     # If only time needs narrow panels while V**2 decreases, there is a turn ahead.
-    turning = end < panel.v2 and ratio > TURNING_RATIO * worst
+    turning = end < panel.v2 and ratio > TURNING_RATIO * max(worst, of_force)
     if timed:
-        factor = min(factor, growth_towards(ratio, -1.0) if turning else growth(ratio))
+        factor = min(factor, growth_towards(ratio, -1.0) if turning else growth(max(ratio, of_force)))
     elif needed:
-        factor = growth_towards(ratio, 1.0) if turning else growth(ratio)
+        factor = growth_towards(ratio, 1.0) if turning else growth(max(ratio, of_force))
     return timed or not needed, factor, timed
 
 
@@ -221,15 +224,23 @@ def are_all_resolved(forces, march, panel, request, last, work):  # type: ignore
 
 
 @Inner
-def is_length_resolved(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """Return whether the square of the length of the contact force is resolved, and the ratio of its middle
-    coefficients to its size; the rows N0 and KAPPA become the length and 0.
+def is_force_resolved(forces, march, panel, is_length, work):  # type: ignore[no-untyped-def]
+    """Return whether the contact force is resolved, and the ratio of its middle coefficients to its size.
+
+    If its length is read, that is the square of it, and the rows N0 and KAPPA become the length and 0. In a rotating
+    frame the length depends on V, as time does.
     """
-    fill_length(forces, march, panel, work)
-    product(work, MEAN, N0, N0)
+    if is_length:
+        fill_length(forces, march, panel, work)
+        product(work, MEAN, N0, N0)
+    else:
+        load_per_mass_row(work, MEAN, N0, KAPPA, W)
     size = size_of(work, MEAN)
-    tail, middle, _ = examine(work, MEAN, size)
-    return tail <= LENGTH_TAIL * size, middle / size
+    tail, middle, fine = examine(work, MEAN, size)
+    if tail <= FORCE_TAIL * size:
+        return True, middle / size
+    # Where 1 - kappa rho is small, rho being the radius, the contact force has the roundings of that.
+    return fine and not is_length, CANCELLATION_NOISE if fine else middle / size
 
 
 @Inner
@@ -321,7 +332,7 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
         fine, worst = are_all_resolved(forces, march, panel, request, last, work)
         worst = max(worst, ratio)
         factor, jump = growth(worst), jump_on(before, work)
-        if fine and jump[0] == 1.0 and not hides_cusp(forces, march, panel, work):
+        if fine and jump[0] == 1.0 and fits(forces, work) and not hides_cusp(forces, march, panel, work):
             widest = max(widest, width)
             is_tiny_part = width <= NOISE_WIDTH_RATIO * widest
             done, factor, timed = resolve_time(forces, march, panel, request, largest_v2, worst, is_tiny_part, work)

@@ -39,6 +39,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     fill_load,
     fill_times,
     fill_v2,
+    fits_on_leg,
     form_of,
     keeps_sign,
     load_sign,
@@ -90,7 +91,7 @@ def is_resolved(forces, march, panel, blocks, variable, kinks, work):  # type: i
     if not (fine and load_fine):
         return False, blocks_for(max(ratio, load_ratio), blocks, is_stretched, work[GRADE]), ratio
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
-    if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
+    if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise) and fits_on_leg(forces, blocks, work)):
         return False, 0, 1.0
     if not (curve_fine and bends_one_way):
         return False, blocks_for(curve_ratio, blocks, is_stretched, work[GRADE]), curve_ratio

@@ -145,7 +145,7 @@ def run_back(forces, end, breaks, off, reading, record, used):  # type: ignore[n
         if not has_space(record, at, end.change_count):
             return NO_SPACE
         panel = Panel(left, v2, remaining[2], span_before(breaks, remaining[1] + 1, v, off))
-        request = PanelRequest(max_width, step, 0.0, ALWAYS, False, reading.length)
+        request = PanelRequest(max_width, step, 0.0, ALWAYS, False, reading.force, reading.length)
         width, step, _timed = next_panel(forces, march, panel, request, work)
         if width == 0.0:
             break
@@ -190,7 +190,7 @@ def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
         if stop <= left:
             break
         panel = Panel(left, v2, remaining[2], span_before(breaks, remaining[1] + 1, forces.direction, off))
-        request = PanelRequest(stop - left, step, 0.0, NEVER, False, False)
+        request = PanelRequest(stop - left, step, 0.0, NEVER, False, False, False)
         width, step, _timed = next_panel(forces, march, panel, request, work)
         if width == 0.0:
             break
@@ -293,7 +293,7 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
     width, may_be_whole = start.width, start.v2 == 0.0 and start.blocks > 0
     rest = law_at_rest(forces, start.place, start.contact_sign) if may_be_whole else SMOOTH_AT_REST
     if may_be_whole and rest.slope >= 0.0:
-        if route.reading.what == PASSAGE and not passes_kinks(start):
+        if route.reading.what == PASSAGE and not (forces.has_radius or passes_kinks(start)):
             end, blocks, branch = run_to_target(forces, start, branch, rest, route, off, record)
             if end.what == END_PAUSE:
                 return end, blocks, branch

@@ -153,7 +153,9 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             break
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
         timing = ALWAYS if run_length < start.no_turn_until else (NEVER if searching or late else MAYBE)
-        request = PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True, route.reading.length)
+        request = PanelRequest(
+            *(min(max_width, ahead.widest), step, largest_v2, timing, True, route.reading.force, route.reading.length)
+        )
         width, step, is_timed, (what, run_length, v2) = panel_or_end(
             forces, march, panel, request, start, (run_length, stop), work, point
         )

@@ -12,7 +12,7 @@ from gqm_sym.runtime.legs.panels.breaks import place_after, within
 from gqm_sym.runtime.legs.panels.equation import FORCE, LOAD, March, P, Panel, W, marched
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, ZERO_TOLERANCE, law_at_rest, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT
-from gqm_sym.runtime.legs.panels.resolution import examine, first_change_of, set_sizes, size_at
+from gqm_sym.runtime.legs.panels.resolution import examine, first_change_of, fits, set_sizes, size_at
 from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_panel
 from gqm_sym.runtime.legs.panels.widest import ALWAYS, PanelRequest, are_all_resolved, next_panel
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, end_at_once
@@ -56,7 +56,7 @@ def distance_to_turn(forces, march, panel, run_length, limits, work, point):  # 
     # Next to the turn V**2 is nearly linear, and what was expected before may be farther off than the turn.
     if linear > 0.0:
         d = min(d, 2.0 * linear) if d > 0.0 else linear
-    request = PanelRequest(inf, 0.0, 0.0, ALWAYS, True, False)
+    request = PanelRequest(inf, 0.0, 0.0, ALWAYS, True, False, False)
     for _ in range(MAX_TRIES):
         if not 0.0 < d < room:
             return nan
@@ -71,7 +71,7 @@ def distance_to_turn(forces, march, panel, run_length, limits, work, point):  # 
         nu, noise = panel.contact_sign, ZERO_TOLERANCE * work[size_at(LOAD)]
         if not are_all_resolved(forces, back, from_turn, request, P, work)[0]:
             return nan
-        if examine(work, FORCE, work[size_at(FORCE)])[0] > MAX_NOISE * work[size_at(FORCE)]:
+        if not fits(forces, work) or examine(work, FORCE, work[size_at(FORCE)])[0] > MAX_NOISE * work[size_at(FORCE)]:
             return nan
         if nu != 0 and first_change_of(work, LOAD, nu, noise)[0] <= 1.0:
             return nan

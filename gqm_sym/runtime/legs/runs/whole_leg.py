@@ -80,6 +80,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     fill_load,
     fill_times,
     fill_v2,
+    fits_on_leg,
     form_of,
     is_contact_force_resolved,
     keeps_sign,
@@ -250,7 +251,7 @@ def is_whole(forces, march, panel, blocks, variable, reading, kinks, work):  # t
     if not (fine and load_fine and curve_fine):
         return False, blocks_for(max(ratio, curve_ratio, load_ratio), blocks, is_stretched, work[GRADE]), ratio
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
-    if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
+    if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise) and fits_on_leg(forces, blocks, work)):
         return False, 0, 1.0
     fine, ratio = fill_times(blocks, h, work)
     return fine, blocks_for(ratio, blocks, is_stretched, work[GRADE]), ratio

@@ -158,6 +158,12 @@ def keeps_sign(blocks, work, row, sign, noise):  # type: ignore[no-untyped-def]
     return least > 0.125 * spacing * spacing * bend + noise
 
 
+@Inner
+def fits_on_leg(forces, blocks, work):  # type: ignore[no-untyped-def]
+    """Return whether a body with a radius is proved to fit into its track all along a leg."""
+    return not forces.has_radius or keeps_sign(blocks, work, DS, 1, 0.0)
+
+
 @Inlined
 def form_of(blocks, work):  # type: ignore[no-untyped-def]
     """Return the form of rows (`whole_tables`)."""

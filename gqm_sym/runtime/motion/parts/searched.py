@@ -11,8 +11,8 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import potential_at
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
-# The number of samples on each panel of a segment.
-SAMPLES_PER_PANEL = 16
+# The places of the samples on each panel of a segment, as shares of its width.
+STEPS = np.arange(16) / 16
 
 # The distance from a joint at which a quantity that jumps there is sampled, as a share of the segment.
 BESIDE_EDGE = 5e-10
@@ -59,25 +59,31 @@ def _is_endless(motion: Any) -> bool:
 def trajectory_with_extreme(motion: Any, quantity: Any, sign: int) -> tuple[Trajectory, float]:
     """Return the trajectory of a motion up to a time after which a quantity is nowhere more extreme, and that time.
 
-    A swing that dies away for ever has its extremes in its first swings, or approaches them without end. The quantity
-    is an `extremes.Quantity`.
+    A swing that dies away has its extremes in its first swings, or approaches them. The quantity is an
+    `extremes.Quantity`.
 
     Raises
     ------
     SolutionError
         As `extreme`.
     """
-    if (quantity.is_quadratic or quantity.is_length) and _is_endless(motion):
+    if (quantity.is_quadratic or quantity.is_length) and not _repeats(motion):
+        end = motion._end_of_legs()
         for turns in TURNS_OF_SEARCH:
             trajectory = motion._up_to_turn(turns)
             if trajectory is None:
                 break
             segments = trajectory.segments
+            if segments[-1].t_stop[0] > end:
+                break
             ends = [k for k, timed in enumerate(segments) if timed.end == "turn"][turns - 3 :]
-            before, across, after = (float(segments[k].segment.places(_stop(segments[k]))[0]) for k in ends)
-            is_within = min(before, across) < after < max(before, across)
-            if is_within and not _is_exceeded(quantity, sign, segments, ends[0] + 1):
+            before, across, after = (_place_of_turn(segments[k], trajectory.lap) for k in ends)
+            if not min(before, across) < after < max(before, across):
+                continue
+            if quantity.grows_with_speed or not _is_exceeded(quantity, sign, segments, ends[0] + 1):
                 return trajectory, segments[-1].t_stop[0]
+            if isfinite(end):  # the search of the whole motion takes less time than further attempts
+                break
     return whole_trajectory(motion)
 
 
@@ -91,8 +97,8 @@ def swings_below(motion: Any, speed: float) -> bool:
     return bool(sqrt(2.0 * abs(high - low)) * sqrt(float(np.abs(slopes).max())) < speed)
 
 
-def _stop(timed: TimedSegment) -> Array:
-    return np.array([timed.phi_stop])
+def _place_of_turn(timed: TimedSegment, lap: float) -> float:
+    return float(timed.segment.places(np.array([timed.phi_stop]))[0]) + timed.laps * lap
 
 
 def _is_exceeded(quantity: Any, sign: int, segments: tuple[TimedSegment, ...], begin: int) -> bool:
@@ -124,13 +130,18 @@ def samples(segment: Any, joints: Array, low: float, high: float) -> Array:
     """Return the phase angles between two of a segment at which a quantity is sampled, in order; places on both sides
     of the joints, at which it jumps, are among them.
     """
-    edges, beside = segment.edges, BESIDE_EDGE * (high - low)
-    steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
-    inside = np.concatenate(
-        [(edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), joints - beside, joints + beside]
+    edges, close = segment.edges, LEAST_DISTANCE * (high - low)
+    inside = (edges[:-1, None] + (edges[1:] - edges[:-1])[:, None] * STEPS).ravel()
+    first, last = inside.searchsorted(low + close, side="right"), inside.searchsorted(high - close, side="left")
+    found = np.empty(max(last - first, 0) + 2)
+    found[0], found[1:-1], found[-1] = low, inside[first:last], high
+    if not joints.size:
+        return found
+    beside = BESIDE_EDGE * (high - low)
+    beside_joints = np.concatenate([joints - beside, joints + beside])
+    return np.unique(
+        np.concatenate([found, beside_joints[(beside_joints > low + close) & (beside_joints < high - close)]])
     )
-    close = LEAST_DISTANCE * (high - low)
-    return np.unique([low, *inside[(inside > low + close) & (inside < high - close)], high])
 
 
 def size_of(values: Array) -> float:

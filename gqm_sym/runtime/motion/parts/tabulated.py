@@ -80,6 +80,10 @@ class Tabulated(Positions):
     def _pieces(self) -> Sequence[TimedSegment]:
         """All segments so far."""
 
+    def _pieces_up_to(self, _: float) -> Sequence[TimedSegment]:
+        """Return the first segments so far, up to the one on which a time falls at least."""
+        return self._pieces
+
     def _follow_amply(self, enough: float) -> None:
         """Follow the motion until there are enough pieces, if this is worth its time."""
 
@@ -179,7 +183,7 @@ class Tabulated(Positions):
     def _read_first(self, t: float, errors: bool) -> Reading:
         """Return the record of `_reading_at` after following the motion up to the time."""
         self._check_end(t)
-        pieces, first = self._pieces, self._first_reading
+        pieces, first = self._pieces_up_to(t), self._first_reading
         k = bisect_right(pieces, t, key=lambda timed: timed.t_stop[0])
         is_known = first.until >= 0.0
         if k == len(pieces) or (is_known and pieces[k].t_start[0] != first.since):

@@ -37,7 +37,7 @@ def test_branch_points(square: Any, leg: tuple[float, float], near: tuple[str, s
     )
 
 
-NONLINEAR = Forces(0, np.zeros(1), True, False, False, 1, 0, 0)
+NONLINEAR = Forces(0, np.zeros(1), True, False, False, False, 1, 0, 0)
 LINEAR = NONLINEAR._replace(linear=True)
 
 

@@ -52,7 +52,7 @@ def test_tables(blocks: int) -> None:
 def test_v2_on_a_wider_leg(blocks: int) -> None:
     """V**2 moves with the width of the leg up to the square of the step; its second half was counted from the end."""
     v2, slope, y = (lambda d: np.sin(2.0 * d)), (lambda d: 2.0 * np.cos(2.0 * d)), whole_tables.nodes(blocks)[0]
-    forces, half = Forces(0, np.zeros(1), True, False, False, -1, 0, 0), blocks * WIDE // 2
+    forces, half = Forces(0, np.zeros(1), True, False, False, False, -1, 0, 0), blocks * WIDE // 2
     turn = 0.5 * np.pi
     for step in (0.02, -0.02):
         h, work = turn / (1.0 + step), np.zeros(WORK)
