@@ -86,6 +86,11 @@ def read_banking(roll: Roll | None, heartline: Source, where: str = "space") -> 
         return Banking(angle=None, speed=speed, heartline=height)
     if _is_coordinated(roll):
         return Banking(angle=None, speed=None, heartline=height)
+    if isinstance(roll, str) and roll == OF_PIECES:  # `Curve.piecewise` replaces it by the chart of the roll
+        raise DeclarationError(
+            f"{where}: roll: {OF_PIECES!r} is the roll of the pieces of a rail (Curve.piecewise), of which this curve "
+            f"has none; declare an angle or {COORDINATED!r}"
+        )
     of_points = isinstance(roll, SpaceFunction)
     angle = roll if of_points else read_expression(roll, where=f"{where}: roll", unit="rad")
     return Banking(angle=angle, speed=None, heartline=height)

@@ -1,6 +1,7 @@
 """Checks that points lie along a track: in order, near enough to each other, and without much scatter."""
 
 import warnings
+from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, dist, hypot, pi
 from statistics import median
@@ -27,6 +28,9 @@ LONG_CHORD_RATIO = 8.0
 MAX_ALTERNATING_SHARE = 0.5
 # if it changes loads by this many g at the speed of a body that has fallen over the size of the track.
 NOTICEABLE_LOAD = 0.1
+
+# In place of the length of a chord between equal points, by which it is divided.
+SMALLEST = 5e-324
 
 # So many successive turns to alternating sides by more than this are a zigzag through which no smooth track passes: the
 # lengths of the spline between such points do not converge.
@@ -74,16 +78,16 @@ def _turns(places: list[Place], joined: bool) -> list[float]:
     """Return the angle by which the track turns at each point between two others; in space it has no sign."""
     around = [*places, *places[:2]] if joined else places
     if len(places[0]) == IN_SPACE:
-        steps = [tuple(there - here for here, there in zip(*pair, strict=True)) for pair in pairwise(around)]
+        steps = [_difference(*pair) for pair in pairwise(around)]
         return [_angle(before, after) for before, after in pairwise(steps)]
     angles = [atan2(two[1] - one[1], two[0] - one[0]) for one, two in pairwise(around)]
     return [(after - before + pi) % (2.0 * pi) - pi for before, after in pairwise(angles)]
 
 
-def _angle(one: Place, two: Place) -> float:
+def _angle(one: Sequence[float], two: Sequence[float]) -> float:
     """Return the angle between two vectors in space."""
     crossed = [one[i] * two[j] - one[j] * two[i] for i, j in ((1, 2), (2, 0), (0, 1))]
-    return atan2(hypot(*crossed), sum(first * second for first, second in zip(one, two, strict=True)))
+    return atan2(hypot(*crossed), _product(one, two))
 
 
 def check_order(places: list[Place], size: float, kind: str, joined: bool) -> None:
@@ -116,17 +120,19 @@ def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
 
     Scatter of points at distances h contributes to the curvature divided by h**2. If it dominates the curvature, the
     sign of the curvature changes between most neighbours; the sign of the curvature's changes shows it earlier, and on
-    a loop as well.
+    a loop as well. In space the curvature is a vector: of its change, the part across the track counts, and changes
+    have opposite signs if they point to opposite sides.
     """
-    chords = _chords(places, joined)
-    if joined:
-        chords.append(chords[0])
+    around = [*places, *places[:2]] if joined else places
+    chords = [_difference(one, two) for one, two in pairwise(around)]
+    lengths = [hypot(*chord) or SMALLEST for chord in chords]
+    ahead = [[part / length for part in chord] for chord, length in zip(chords, lengths, strict=True)]
     bends = [
-        2.0 * turn / (before + after)
-        for turn, (before, after) in zip(_turns(places, joined), pairwise(chords), strict=True)
+        [2.0 * part / (before + after) for part in _difference(one, two)]
+        for (one, two), (before, after) in zip(pairwise(ahead), pairwise(lengths), strict=True)
     ]
-    steps = [after - before for before, after in pairwise(bends)]
-    swings = [abs(after - before) / 4.0 for before, after in pairwise(steps) if before * after < 0.0]
+    steps = [_across(_difference(*pair), along) for pair, along in zip(pairwise(bends), ahead[1:-1], strict=True)]
+    swings = [dist(one, two) / 4.0 for one, two in pairwise(steps) if _product(one, two) < 0.0]
     if len(swings) <= MAX_ALTERNATING_SHARE * (len(steps) - 1):
         return
     felt = 2.0 * extent(places) * median(swings)
@@ -138,6 +144,22 @@ def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
             NoisyPointsWarning,
             stacklevel=5,
         )
+
+
+def _difference(one: Sequence[float], two: Sequence[float]) -> list[float]:
+    """Return the vector from one place to another."""
+    return [there - here for here, there in zip(one, two, strict=True)]
+
+
+def _product(one: Sequence[float], two: Sequence[float]) -> float:
+    """Return the scalar product of two vectors."""
+    return sum(first * second for first, second in zip(one, two, strict=True))
+
+
+def _across(vector: list[float], along: list[float]) -> list[float]:
+    """Return the part of a vector that is orthogonal to a unit vector."""
+    share = _product(vector, along)
+    return [part - share * unit for part, unit in zip(vector, along, strict=True)]
 
 
 def _check_zigzag(turns: list[float]) -> None:

@@ -148,14 +148,13 @@ def read_track(
         raise DeclarationError(f"sampled: {len(places)} different points; {what} track of {how} needs {fewest} or more")
     if deviation is None:
         check_order(places, size, kind, joined)
-        if kind == "spline" and not in_space:
+        if kind == "spline":
             warn_of_scatter(places, joined, "give their standard deviation in metres as smoothing, or 'auto'")
         texts = [" ".join(parts) for parts in zip(texts, angles, strict=False)] if angles else texts
         return Track(points="\n".join(texts), kind=kind, closed=joined)
     check_survey(places, rows, joined, 0.0 if deviation == "auto" else deviation)
     smoothed, report = _smoothed(places, rows, joined, deviation, angles)
-    if not in_space:
-        warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
+    warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
     kept = "\n".join(" ".join(map(repr, place)) for place in smoothed)
     return Track(points=kept, kind=kind, closed=joined, smoothing=report)
 

@@ -29,7 +29,8 @@ from gqm_sym.design.limits import (
 from gqm_sym.design.moving_points import lossy_limits, problem_of, slopes_by_heights, source_along
 from gqm_sym.design.shape import SplineChanges, time_gradient
 from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, SolutionError
-from gqm_sym.fitting.quotients import central_differences
+from gqm_sym.fitting.least_squares import power_of_two
+from gqm_sym.fitting.quotients import central_differences, usual_sizes
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
 from gqm_sym.runtime.charts.sampled import Sampled
@@ -134,7 +135,7 @@ def minimise(
             return found if isfinite(found) else PENALTY
 
         def quotients(function: Callable[[Array], Any], x: Array) -> Array:
-            steps = tracks.step * np.maximum(np.abs(x), tracks.size)
+            steps = tracks.step * np.maximum(np.abs(x), tracks.sizes)
             return central_differences(function, x, steps, tracks.low, tracks.high)
 
         def slopes(x: Array) -> Array:
@@ -150,16 +151,19 @@ def minimise(
 
             return np.concatenate(slopes_of(held, tracks.limited(x, between), of_one, x.size))
 
+        # SLSQP's first step is that for unknowns near one; in units that are powers of two, nothing is rounded.
+        units = power_of_two(tracks.sizes)
+        limited = {"type": "ineq", "fun": lambda y: margins(y * units), "jac": lambda y: steepness(y * units) * units}
         found = minimize(
-            value,
-            tracks.start,
-            jac=slopes,
+            lambda y: value(y * units),
+            tracks.start / units,
+            jac=lambda y: slopes(y * units) * units,
             method="SLSQP",
-            bounds=list(zip(tracks.low, tracks.high, strict=True)),
-            constraints=[{"type": "ineq", "fun": margins, "jac": steepness}] if held else [],
+            bounds=list(zip(tracks.low / units, tracks.high / units, strict=True)),
+            constraints=[limited] if held else [],
             options={"maxiter": MAX_STEPS, "ftol": tracks.tolerance},
         )
-        best = np.asarray(found.x)
+        best = np.asarray(found.x) * units
         _check(held, tracks.limited(best, between) if held else None)
         if found.status == 9:  # SLSQP's code for this
             raise SolutionError(
@@ -186,8 +190,8 @@ class _Tracks(ABC):
     ----------
     start, low, high : (n,) arrays
         First guesses and limits of the unknowns.
-    size : float
-        The scale of the unknowns.
+    sizes : (n,) array
+        The sizes that the unknowns have, in their units.
     step, tolerance : float
         The step of a difference quotient as a share of the size, and the relative change of the quantity at which the
         optimiser ends.
@@ -196,7 +200,7 @@ class _Tracks(ABC):
     start: Array
     low: Array
     high: Array
-    size: float = 1e-3
+    sizes: Array
     step: float = 1e-5
     tolerance: float = 1e-13
 
@@ -296,6 +300,7 @@ class _Family(_Tracks):
             rows.append(read_bounds(limits, guess, str(name)))
         self._names = tuple(free)
         self.low, self.start, self.high = np.array(rows, dtype=np.float64).T.copy()
+        self.sizes = usual_sizes(self.start, self.low, self.high)
 
     def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
         return self._compiled, dict(zip(self._names, x.tolist(), strict=True))
@@ -345,7 +350,6 @@ class _Points(_Tracks):
     def _read(self, track: Any, free: Any) -> None:
         self._curve = Curve.sampled(track)
         self._points = np.array([[float(number) for number in row] for row in np.asarray(track).tolist()])
-        self.size = float(np.ptp(self._points, axis=0).max())
         listed = free if isinstance(free, Iterable) and not isinstance(free, str) else ()
         self._moved = [int(number) if isinstance(number, np.integer) else number for number in listed]
         rows = []
@@ -359,6 +363,7 @@ class _Points(_Tracks):
         if not rows:
             raise DeclarationError("design.minimise: free: no point may move; give their numbers, as in range(1, 9)")
         self.low, self.start, self.high = np.array(rows, dtype=np.float64).T.copy()
+        self.sizes = np.full(self.start.size, np.ptp(self._points, axis=0).max())
 
     def _heights(self, x: Array) -> Array:
         points = self._points.copy()

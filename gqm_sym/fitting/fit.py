@@ -13,7 +13,7 @@ from gqm_sym.arguments import compiled_model, short, unknown_argument
 from gqm_sym.errors import GQMError, InputError, SolutionError
 from gqm_sym.fitting.data import Measurements, read_measurements
 from gqm_sym.fitting.least_squares import least_squares_between
-from gqm_sym.fitting.quotients import central_differences
+from gqm_sym.fitting.quotients import central_differences, usual_sizes
 from gqm_sym.fitting.result import Fit
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
@@ -261,8 +261,9 @@ class Residuals:
 
     def _differences(self, x: Array) -> Array:
         """Return the derivatives by difference quotients."""
-        steps = STEP * np.maximum(np.abs(x), 1e-3 * np.maximum(np.abs(self.free.start), 1.0))
-        return central_differences(self.predicted, x, steps, self.free.low, self.free.high)
+        free = self.free
+        steps = STEP * np.maximum(np.abs(x), 1e-3 * usual_sizes(free.start, free.low, free.high))
+        return central_differences(self.predicted, x, steps, free.low, free.high)
 
 
 def _until_rest(motion: Any, t: Array) -> Array:
@@ -308,7 +309,7 @@ def _passage(motion: Any, leg: Any, place: float, lap: float) -> float | None:
         return None
     if place == leg.lam_start:
         return float(leg.t_start)
-    return float(brentq(lambda t: float(motion.lam(t)) - place, leg.t_start, leg.t_end, xtol=1e-15, rtol=1e-15))
+    return float(brentq(lambda t: float(motion.lam(t)) - place, leg.t_start, leg.t_end, xtol=1e-300, rtol=1e-15))
 
 
 def _result(residuals: Residuals, x: Array, held: NDArray[np.bool_]) -> Fit:

@@ -63,8 +63,8 @@ def _with_moved(
     from scipy.optimize import least_squares
 
     owed = np.linalg.norm(jacobian(x)[:, moves], axis=0)
-    unit = _power_of_two(max(np.linalg.norm(residuals(x)), np.max(np.abs(x[moves]) * owed)))
-    units = unit / _power_of_two(owed)
+    unit = power_of_two(max(np.linalg.norm(residuals(x)), np.max(np.abs(x[moves]) * owed)))
+    units = unit / power_of_two(owed)
 
     def all_of(some: Array) -> Array:
         moved = x.copy()
@@ -90,7 +90,7 @@ def _with_moved(
     return x
 
 
-def _power_of_two(size: Any) -> Any:
+def power_of_two(size: Any) -> Any:
     """Return the powers of two next to sizes; one for zero."""
     return np.exp2(np.rint(np.log2(np.where(size > 0.0, size, 1.0))))
 

@@ -9,6 +9,19 @@ import numpy as np
 from gqm_sym.runtime.compiled.types import Array
 
 
+def usual_sizes(start: Array, low: Array, high: Array) -> Array:
+    """Return the sizes that unknowns have in their units: those of first guesses, or the width between limits, or one.
+
+    Parameters
+    ----------
+    start, low, high : (n,) array
+        The first guesses and the limits, which may be infinite.
+    """
+    width = high - low
+    sizes: Array = np.where(start != 0.0, np.abs(start), np.where(np.isfinite(width), width, 1.0))
+    return sizes
+
+
 def central_differences(
     function: Callable[[Array], Any], at: Array, steps: Array, low: Any = -inf, high: Any = inf
 ) -> Array:

@@ -277,6 +277,7 @@ BAD: tuple[tuple[Callable[[], object], str], ...] = (
     (lambda: gqm.Curve.space(**WAY, heartline=1), "heartline: 1 is measured across the banked track; declare roll too"),
     (lambda: gqm.Curve.space(**WAY, roll=("flat", 3)), r"roll: must be an angle, 'coordinated' or \('coordinated'"),
     (lambda: gqm.Curve.space(**WAY, roll="sin("), "space: roll"),
+    (lambda: gqm.Curve.space(**WAY, roll="pieces"), r"roll: 'pieces' is the roll of the pieces of a rail"),
     (lambda: generated.viviani.solve("3/10").exceedance("vertical", 1), "declare it by Curve.space"),
     (lambda: generated.viviani.solve("3/10").n_lateral_max, "n_lateral: the load on a rider depends on the banking"),
     (

@@ -169,6 +169,7 @@ def test_angles_are_determined_up_to_whole_turns() -> None:
         ({"roll": [0.1] * 47 + [float("nan")]}, "row 48: nan is not finite"),
         ({"roll": {"at": 1}}, "roll: must be an angle for each point, a formula in s or 'coordinated', got"),
         ({"roll": ("flat", 3)}, r"roll: must be an angle, 'coordinated' or \('coordinated', speed\)"),
+        ({"roll": "pieces"}, "roll: 'pieces' is the roll of the pieces of a rail"),
         ({"heartline": "9/10"}, "heartline: 9/10 is measured across the banked track; declare roll too"),
     ],
 )

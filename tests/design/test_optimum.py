@@ -34,6 +34,13 @@ def test_the_quickest_plane() -> None:
     assert steepness(gqm.Gravity(), limits=load, between=(0.1, 0.9)) == pytest.approx(sqrt(1 / 0.5625 - 1), rel=1e-9)
 
 
+def test_unknowns_in_nanometres() -> None:
+    """An unknown that is a small number is found as others are: a plane to a wall 1 nm away falls by as much."""
+    plane = gqm.Curve.graph("-h*x/1e-9", domain=(0, 1e-9), parameters={"h": 4e-10})
+    best = gqm.design.minimise("time_at", plane, gqm.Gravity(), free={"h": (1e-10, 4e-10, 4e-9)}, lam0=0)
+    assert float(dict(best.defaults)["h"]) == pytest.approx(1e-9, rel=1e-6, abs=0.0)
+
+
 def test_with_friction() -> None:
     """With friction the quickest plane is steeper by half of the angle of friction."""
     force = gqm.Gravity() + gqm.CoulombFriction(mu="0.3")

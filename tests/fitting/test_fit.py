@@ -12,7 +12,7 @@ import pint
 import pytest
 from paths import ROOT
 from scipy.optimize import brentq
-from scipy.special import ellipj, ellipk
+from scipy.special import ellipj, ellipk, ellipkinc
 
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, SolutionError
@@ -82,6 +82,19 @@ def test_measurements_in_nanometres(pendulum: ModuleType) -> None:
         free = {"L": (0.0, 0.99 * length, 2.0 * length), "lam0": (0.0, 1.01 * amplitude, 1.0)}
         found = gqm.fit(pendulum, {"t": t, name: data[name]}, free)
         assert found.estimates == pytest.approx({"L": length, "lam0": amplitude}, rel=1e-12, abs=0.0)
+
+
+def test_passages_and_quotients_in_nanometres(pendulum: ModuleType) -> None:
+    """Short times of passage have all digits, and steps of difference quotients are small for small unknowns."""
+    length, start, place = 3e-9, 1.1, 0.4
+    k, rate = np.sin(start / 2), (9.81 / length) ** 0.5
+    first = (ellipk(k * k) - ellipkinc(np.arcsin(np.sin(place / 2) / k), k * k)) / rate
+    passages = np.array([first, 4.0 * ellipk(k * k) / rate - first])
+    measured = read_measurements({"passages": passages, "place": place}, {}, None)
+    free = _free(pendulum.MODEL, {"L": length}, {})
+    residuals = Residuals(pendulum, measured, free, {"lam0": start})
+    assert residuals.predicted(free.start) == pytest.approx(passages, rel=1e-14, abs=0.0)
+    assert residuals._differences(free.start)[:, 0] == pytest.approx(0.5 * passages / length, rel=1e-9)
 
 
 def test_periods_against_the_complete_elliptic_integral(pendulum: ModuleType) -> None:

@@ -2,11 +2,14 @@
 about.
 """
 
+import warnings
+
 import numpy as np
 import pytest
 import sympy as sp
 
 import gqm_sym as gqm
+from gqm_sym.errors import NoisyPointsWarning
 from gqm_sym.runtime.charts.chart import SpaceChart
 from gqm_sym.runtime.charts.sampled import Sampled
 
@@ -52,6 +55,25 @@ def parameter_near(places: np.ndarray) -> np.ndarray:
         off = places - off
         u = u + (off * first).sum(axis=1) / (first**2 - off * second).sum(axis=1)
     return u
+
+
+def test_points_that_scatter_are_noticed() -> None:
+    """There is a warning for points that scatter by a centimetre, and for too small a deviation, and none without
+    scatter or after smoothing.
+    """
+    scattered, _ = surveyed(0.01, 1, FINE[-1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for scatter, stop in ((0.0, FINE[-1]), (1e-7, FINE[-1]), (0.0, 4.5), (1e-7, 4.5)):
+            gqm.Curve.sampled(surveyed(scatter, 1, stop)[0])
+        gqm.Curve.sampled(scattered, smoothing=0.01, closed=True)
+    for points, closed in ((scattered, True), (surveyed(0.01, 1, 4.5)[0], False)):
+        with pytest.warns(
+            NoisyPointsWarning, match=r"^sampled: the curvature goes up and down .* smoothing, or 'auto'$"
+        ):
+            gqm.Curve.sampled(points, closed=closed)
+    with pytest.warns(NoisyPointsWarning, match=r"smoothing 0\.001 is less than their scatter$"):
+        gqm.Curve.sampled(scattered, smoothing=0.001, closed=True)
 
 
 @pytest.mark.sample(1)

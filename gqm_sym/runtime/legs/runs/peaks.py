@@ -1,7 +1,8 @@
 """The largest or smallest speed or contact force on a leg, from its record.
 
-On a leg with a stretched variable (`leg_variable`), the contact force is resolved only so far that one can tell where
-it is largest, because its singularities stay branches there. The law gives it at this place.
+The polynomial of a whole leg tells where the contact force is largest or smallest, and the law gives it at this place.
+A small contact force, as at a launch from rest on a steep place, would have the rounding errors of the largest one.
+On a leg with a stretched variable (`leg_variable`), its singularities stay branches, and it is resolved only so far.
 """
 
 from math import cos, fabs, inf, nan, sin, sqrt
@@ -17,7 +18,6 @@ from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     END,
     END_LOW,
-    EXTENT,
     HALF_C,
     HEAD,
     HEADING,
@@ -324,7 +324,7 @@ def peak_of_rows(forces, record, until, asked, best):  # type: ignore[no-untyped
     for at in range(0, blocks * WIDE, WIDE):
         copy(values, at, record, HEAD + (1 if function == SPEED else 2) * blocks * WIDE + at)
     last = 1.0 if until >= record[TIME_FROM_START] + record[TIME_FROM_END] else place_in_rows(record, max(until, 0.0))
-    if function == LOAD and (record[EXTENT] > 0.0 or grade_of(form) > 1):
+    if function == LOAD and record[WHOLE_WIDTH] > 0.0:
         ends = (record[START], record[START_LOW]), (record[END], record[END_LOW])
         stretch = Stretch(*ends, record[HEADING], variable_of_rows(record, record[WHOLE_WIDTH]))
         return peak_of_force(forces, stretch, form, values, record[HEAD + blocks * WIDE :], last, sign, best)

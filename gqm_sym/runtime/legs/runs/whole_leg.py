@@ -341,7 +341,9 @@ def enter_leg(record, route, origin, v, blocks, variable, work):  # type: ignore
     first, second = work[blocks * TAILS], work[blocks * TAILS + 1]
     enter_rows(record, blocks, route, is_read(route, origin, v, h, first + second), work)
     is_located = variable.extent > 0.0 or work[GRADE] > 1.0
-    is_wanted = route.reading.what >= PANELS or (route.reading.what == PEAKS and is_located)
+    # Beside joints, the law is not evaluated at the ends of a leg.
+    by_law = is_located or (route.reading.force and route.breaks.size == 0)
+    is_wanted = route.reading.what >= PANELS or (route.reading.what == PEAKS and by_law)
     record[WHOLE_WIDTH] = h if is_wanted else 0.0
     record[RISING], record[FALLING], record[EXTENT] = variable.rising, variable.falling, variable.extent
     record[TIME_FROM_START], record[TIME_FROM_END] = first, second

@@ -28,3 +28,11 @@ def test_an_extreme_next_to_the_end_is_found(start: float) -> None:
     for end in time * (1.0 + 10.0 ** -np.linspace(1.0, 4.0, 10)):
         found = circle_drag.sweep("normal_force_max", [start], 0.0, 1, t_max=float(end)).values[0]
         assert found == pytest.approx(largest, rel=2e-15)
+
+
+@pytest.mark.parametrize("angle", [1.4, 1.5, 1.55])
+def test_the_smallest_contact_force_at_a_release(angle: float) -> None:
+    """It had the rounding errors of the largest one, up to 24 units in the last place of the small value."""
+    smallest = circle_drag.sweep("normal_force_min", angle, 0.0, b=0.05, g=9.81, t_max=10)
+    exact = mpf(9.81) * mp.cos(mpf(angle))
+    assert abs(mpf(float(smallest.values)) / exact - 1) <= 2.0**-52
