@@ -70,7 +70,7 @@ def dissipative() -> list[tuple[str, float]]:
     model = friction.MODEL
     p = model.numbers(tuple(friction.PARAMETERS.values()))
     assert model.dissipation is not None
-    loss = model.dissipation.addresses()
+    loss = model.dissipation.addresses(has_radius=False)
     launch = launched([(-1.0, -inf, inf, 0.0, 1, 0, inf, nan, 6.2088**2)])
     joints, records = Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE), np.empty((1, 16 * COLUMNS))
 

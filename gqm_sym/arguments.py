@@ -111,7 +111,10 @@ def _reason(
         free = [name for name in by_name if name not in kwargs]
         surplus = [f"{name}={short(value)}" for name, value in zip(free, given[len(by_place) :], strict=False)]
         placed = [short(value) for value in given[: len(by_place)]]
-        remedy = f"write {called}({', '.join([*placed, *surplus])})" if surplus else f"it takes {', '.join(names)}"
+        # A curve or a force goes to an argument of its own kind, and not to the first one that is free.
+        is_own = any(type(value).__module__.startswith("gqm_sym.") for value in given[len(by_place) :])
+        written = f"write {called}({', '.join([*placed, *surplus])})"
+        remedy = written if surplus and not is_own else f"it takes {', '.join(names)}"
         what = "arguments by name only" if not by_place else f"only {' and '.join(by_place)} without a name"
         return f"{called}: takes {what}, got {short(given[len(by_place)])} without one; {remedy}"
     twice = [name for name in by_place[: len(given)] if name in kwargs]

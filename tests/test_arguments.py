@@ -320,6 +320,7 @@ def test_questions_without_an_answer_take_no_time():
         (lambda: gqm.derive(TRACK, FORCE, paramters={}), "did you mean 'parameters'?"),
         (lambda: gqm.build(gqm.derive(TRACK, FORCE), "hill"), "write build"),
         (lambda: gqm.build(TRACK, name="hill"), "must be a model"),
+        (lambda: gqm.build(TRACK, FORCE), "it takes model, name, folder, force"),
         (lambda: FORCE + 9.81, "must be two kernels"),
     ],
 )

@@ -53,9 +53,10 @@ class ParameterValues(tuple[Number, ...]):
     columns : tuple of lists of arrays or None
         The columns of sweeps with these values (`sweep.columns`), once one has been asked for.
     conditions : dict
-        What all legs with losses share (`legs.conditions.Conditions`), by contact, and their law
-        (`legs.variations.law.FormulaLaw`) as "law", once they have been asked for. Of a train it has the curve of its
-        means (`gradients.charts.means`) as "means", and of that the changes (`gradients.charts.trains`) as "changes".
+        What all legs with losses share (`legs.conditions.Conditions`), by contact, their law
+        (`legs.variations.law.FormulaLaw`) as "law", and "equilibria" near launches of sweeps (`sweep.small_swings`),
+        once they have been asked for. Of a train it has the curve of its means (`gradients.charts.means`) as "means",
+        and of that the changes (`gradients.charts.trains`) as "changes".
     """
 
     values: Array

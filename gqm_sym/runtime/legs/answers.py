@@ -30,6 +30,7 @@ from gqm_sym.runtime.legs.body import (
     LAST_AT,
     LEG_BEFORE,
     PANEL_COUNT,
+    RETRY_WIDTH,
     SIZE,
     STATUS,
     STEP,
@@ -50,7 +51,9 @@ from gqm_sym.runtime.legs.questions import (
     LEAST_SPEED,
     LEFT,
     LEGS,
+    MOST_SPEED,
     MOST_TURNS,
+    NEAR,
     REST_PLACE,
     RUN_AGAIN,
     Findings,
@@ -220,6 +223,14 @@ def row_of(parameters, k, row, gaps):  # type: ignore[no-untyped-def]
     return row
 
 
+@Inner
+def is_near(dissipation, p, joints, question, body):  # type: ignore[no-untyped-def]
+    """Return whether a body may have to be driven by its distance from an equilibrium, which has not been tried."""
+    is_asked = question == ARRIVAL or question == LEAST_SPEED or question == MOST_SPEED
+    is_possible = is_asked and not dissipation.friction and body[RETRY_WIDTH] == 0.0
+    return is_possible and may_be_small(dissipation, p, joints.corners, body)
+
+
 @entry(
     INTEGER(DISSIPATION, MATRIX, VECTOR, JOINTS, INTEGER, MATRIX, MATRIX),
     nogil=True,
@@ -271,6 +282,8 @@ def drive(dissipation, parameters, row, joints, question, bodies, records):  # t
             what = advance(dissipation, p, joints, body, Reading(PANELS, False, False, 1.0, -inf), records[0])
         elif not fits(dissipation, p, body):
             body[VALUE], body[STATUS] = np.nan, LEFT
+        elif is_near(dissipation, p, joints, question, body):
+            body[VALUE], body[STATUS] = np.nan, NEAR
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, records[0])
         else:

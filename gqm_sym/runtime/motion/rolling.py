@@ -79,7 +79,7 @@ def check_end(formulas: "Formulas", f: BoundFunctions, legs: Sequence[Leg]) -> N
         return
     beyond = math.copysign(ROUNDINGS_BESIDE * math.ulp(last.lam_end), last.lam_end - last.lam_start)
     ds = path_and_force_at(f.addresses, f.p, np.array([last.lam_end + beyond]), np.zeros(1))[2, 0]
-    if last.end == "cusp" or not ds > 0.0:
+    if last.end == "cusp" or ds < 0.0:  # not a number where the range of doubles ends
         what = f"{_what(formulas, last.lam_end)}, where it comes after {last.t_end!r} s"
         raise SolutionError(f"{what}; {_remedy(formulas)}")
 

@@ -19,10 +19,11 @@ from gqm_sym.runtime.compiled.strided import (
     lay_out,
 )
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.launch.request import MAX_SPEED, ONLY_SIGN
 from gqm_sym.runtime.legs import questions
 from gqm_sym.runtime.legs.answers import Track, drive_along
-from gqm_sym.runtime.legs.body import SIZE, STATUS, VALUE
+from gqm_sym.runtime.legs.body import LEAST_SWING, RETRY_WIDTH, SIZE, STATUS, VALUE
 from gqm_sym.runtime.legs.leg_record import COLUMNS
 from gqm_sym.runtime.sweep import quantities
 from gqm_sym.runtime.sweep.quantities import Answers
@@ -115,6 +116,8 @@ def answer_driven(
     columns: list[Array],
     answers: Answers,
     part: slice,
+    *,
+    by_places: bool = False,
 ) -> None:
     """Fill the answers of a part of launches on one curve, as far as compiled code decides them.
 
@@ -126,45 +129,85 @@ def answer_driven(
         The launches, in the order of `compiled.strided`.
     answers : Answers
         Filled in for this part.
+    by_places : bool
+        Whether bodies near equilibria are driven by their places, too.
     """
+    for begin in range(part.start, part.stop, CHUNK):
+        chunk = slice(begin, min(begin + CHUNK, part.stop))
+        lines = lay_out(columns, chunk.start, chunk.stop)
+        _answer_lines(formulas, asked, track, lines, answers.part(chunk), by_places=by_places)
+
+
+def _answer_lines(
+    formulas: "Formulas", asked: Question, track: Track, lines: list[Array], found: Answers, *, by_places: bool
+) -> None:
+    """Do the work of `answer_driven` for all of some launches, given as arrays side by side."""
     assert formulas.dissipation is not None
     dissipation = formulas.dissipation.addresses(has_radius=bool(formulas.rolling_radius))
     if asked.question >= questions.LEAST_LENGTH and is_read_from_vector(formulas):
         assert formulas.path_in_space is not None
         dissipation = dissipation._replace(path_in_space=formulas.path_in_space.address)
-    no_period = np.int8(quantities.NOT_PERIODIC)
+    possible = _are_possible(lines, found.status.size)
+    chosen = None if possible.all() else np.flatnonzero(possible)
+    some = lines if chosen is None else [line if line.size == 1 else line[chosen] for line in lines]
+    bodies = np.zeros((found.status.size if chosen is None else chosen.size, SIZE))
+    domain = some[DOMAIN_LOW], some[DOMAIN_HIGH], some[DOMAIN_PERIOD]
+    asks = some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET]
+    launches: list[Any] = [some[LAM0], *domain, *asks, some[V0] * some[V0]]  # in the order of `legs.body`
+    for k, column in enumerate(launches):
+        bodies[:, k] = column
+    bodies[:, RETRY_WIDTH] = LEAST_SWING if by_places else 0.0
+    mass = some[PARAMETERS + list(formulas.parameters).index("m")]
+    drive_bodies(asked, dissipation, track, _rows(some[PARAMETERS:], track.chart), bodies, mass, chosen, found)
+
+
+def drive_bodies(
+    asked: Question,
+    dissipation: Dissipation,
+    track: Track,
+    rows: Array,
+    bodies: Array,
+    mass: Array,
+    chosen: NDArray[np.intp] | None,
+    found: Answers,
+) -> None:
+    """Drive bodies, and fill their answers as far as they are decided.
+
+    Parameters
+    ----------
+    dissipation : Dissipation
+        The forces.
+    rows : array
+        The parameters of each body, or of all.
+    bodies : array
+        The bodies at their launch (`legs.body`).
+    mass : array
+        The mass of each, or of all.
+    chosen : array of int, optional
+        The numbers of their answers.
+    found : Answers
+        Filled in.
+    """
     record = np.empty((1, (MAX_PANELS + track.breaks.size) * COLUMNS))
-    mass = PARAMETERS + list(formulas.parameters).index("m")
-    for begin in range(part.start, part.stop, CHUNK):
-        chunk = slice(begin, min(begin + CHUNK, part.stop))
-        lines, found = lay_out(columns, chunk.start, chunk.stop), answers.part(chunk)
-        possible = _are_possible(lines, found.status.size)
-        chosen = None if possible.all() else np.flatnonzero(possible)
-        some = lines if chosen is None else [line if line.size == 1 else line[chosen] for line in lines]
-        bodies = np.zeros((found.status.size if chosen is None else chosen.size, SIZE))
-        domain = some[DOMAIN_LOW], some[DOMAIN_HIGH], some[DOMAIN_PERIOD]
-        asks = some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET]
-        launches: list[Any] = [some[LAM0], *domain, *asks, some[V0] * some[V0]]  # in the order of `legs.body`
-        for k, column in enumerate(launches):
-            bodies[:, k] = column
-        rows = _rows(some[PARAMETERS:], track.chart)
-        drive_along(track, dissipation, rows, asked.question, bodies, record)
-        values, ended = bodies[:, VALUE], bodies[:, STATUS]
-        if asked.question >= questions.LEAST_LOAD and not dissipation.path_in_space:
-            values *= some[mass]
-        status = np.full(ended.size, quantities.ANSWERED, dtype=np.int8)
-        without = ended != questions.FOUND
-        if without.any():
-            none = quantities.NEVER_THERE if asked.question == questions.ARRIVAL else quantities.NOT_PERIODIC
-            values[without], status[without] = nan, none
-            status[ended == questions.TOO_LONG] = quantities.REFUSED
-            decided = ended != questions.LEFT
-            values, status = values[decided], status[decided]
-            chosen = np.flatnonzero(decided) if chosen is None else chosen[decided]
-        if asked.without_answer:
-            values, status = np.full(values.size, nan), np.where(status == quantities.ANSWERED, no_period, status)
-        there = slice(None) if chosen is None else chosen
-        found.values[there, 0], found.status[there], found.route[there] = values, status, quantities.SINGLE
+    drive_along(track, dissipation, rows, asked.question, bodies, record)
+    values, ended = bodies[:, VALUE], bodies[:, STATUS]
+    if asked.question >= questions.LEAST_LOAD and not dissipation.path_in_space:
+        values *= mass
+    status = np.full(ended.size, quantities.ANSWERED, dtype=np.int8)
+    without = ended != questions.FOUND
+    if without.any():
+        none = quantities.NEVER_THERE if asked.question == questions.ARRIVAL else quantities.NOT_PERIODIC
+        values[without], status[without] = nan, none
+        status[ended == questions.TOO_LONG] = quantities.REFUSED
+        status[ended == questions.NEAR] = quantities.NEAR_EQUILIBRIUM
+        decided = ended != questions.LEFT
+        values, status = values[decided], status[decided]
+        chosen = np.flatnonzero(decided) if chosen is None else chosen[decided]
+    if asked.without_answer:
+        no_period = np.int8(quantities.NOT_PERIODIC)
+        values, status = np.full(values.size, nan), np.where(status == quantities.ANSWERED, no_period, status)
+    there = slice(None) if chosen is None else chosen
+    found.values[there, 0], found.status[there], found.route[there] = values, status, quantities.SINGLE
 
 
 def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:

@@ -28,8 +28,8 @@ LOWER_END, UPPER_END = 1, 2
 # The code of a quantity that compiled code does not compute.
 NOT_COMPILED = -1
 
-# The status of a launch, and a sentence for each. While a launch is being answered it is UNDECIDED, or SPAN_KNOWN once
-# a batch has found its turning points.
+# The status of a launch, and a sentence for each. While a launch is being answered it is UNDECIDED, SPAN_KNOWN once a
+# batch has found its turning points, or NEAR_EQUILIBRIUM if it is answered by its distance from one (`small_swings`).
 ANSWERED, UNDECIDED, NOT_PERIODIC, NOT_FINITE, OUTSIDE_DOMAIN, NEVER_THERE, REFUSED = range(7)
 STATUS_SENTENCES = (
     "",
@@ -40,7 +40,7 @@ STATUS_SENTENCES = (
     "the motion is never at the place asked for",
     "the launch is refused; solve says why",
 )
-SPAN_KNOWN = -1
+SPAN_KNOWN, NEAR_EQUILIBRIUM = -1, -2
 
 # The route by which a launch was answered, and a name for each: in a batch of orbits, alone in a compiled loop, or
 # solved as by `solve`.

@@ -35,6 +35,7 @@ from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
 from gqm_sym.runtime.sweep.single.slow_places import NO_TAPE, RecordedFormulas
 from gqm_sym.runtime.sweep.single.until import ROUNDED_TIME
+from gqm_sym.runtime.sweep.small_swings import answer_small_swings
 from gqm_sym.runtime.sweep.tables.panel_forces import ROW
 
 if TYPE_CHECKING:
@@ -144,6 +145,9 @@ def sweep_with_columns(
                 ask = Question(found.code, ONLY_SIGN[contact], last, _rounded_off(formulas, parameters))
                 work, least = partial(_answer, formulas, ask, group, some), MIN_LAUNCHES_PER_THREAD
             run_in_threads(work, some.status.size, least)
+            if asked is not None and (some.status == quantities.NEAR_EQUILIBRIUM).any():
+                p = None if varies else formulas.numbers(parameters)
+                answer_small_swings(formulas, p, asked, track, group.columns, some)
             if asked is None and group.corners.size:
                 some.status[np.broadcast_to(rests_on_corner(group), some.status.size)] = quantities.UNDECIDED
                 if formulas.rolling_radius:  # as `rolling.check_launch` does
