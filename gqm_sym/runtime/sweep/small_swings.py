@@ -16,7 +16,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.strided import DIRECTION, LAM0, TARGET, V0, lay_out
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.ends import starting_step
+from gqm_sym.runtime.launch.ends import first_step, starting_step
 from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.legs.answers import Track
@@ -26,7 +26,7 @@ from gqm_sym.runtime.legs.driver import SWINGS_AHEAD
 from gqm_sym.runtime.legs.frames.entering import Entry, entry_near
 from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_OF_FRAME
 from gqm_sym.runtime.legs.frames.local_frame import PLACE_LOW as LOW_OF_FRAME
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, force_at_rest
+from gqm_sym.runtime.legs.frames.local_frame import RANGE_SHARE, SMALL_SHARE, Frame, force_at_rest
 from gqm_sym.runtime.sweep import quantities
 from gqm_sym.runtime.sweep.dissipative_loop import CHUNK, MIN_BODIES_PER_THREAD, Question, answer_driven, drive_bodies
 from gqm_sym.runtime.sweep.quantities import Answers
@@ -47,9 +47,9 @@ class Equilibrium(NamedTuple):
     Attributes
     ----------
     place : float
-        Its place, rounded; that of the launch if there is none.
+        Its place, rounded.
     frame : Frame or None
-        Its frame; None if bodies cannot be followed in one.
+        Its frame; None if bodies do not swing about it, or cannot be followed in one.
     """
 
     place: float
@@ -91,7 +91,7 @@ def answer_small_swings(
             known.append(_equilibrium_near(formulas, p, float(lam0[left[0]])))
         place, frame = known[number]
         number += 1
-        near = np.abs(lam0[left] - place) <= SMALL_SHARE * np.abs(lam0[left])
+        near = np.abs(lam0[left] - place) <= _surroundings(formulas, p, lam0[left])
         some, left = left[near], left[~near]
         if frame is None:
             by_places.append(some)
@@ -138,18 +138,18 @@ def _drive_in_frame(asked: Question, frame: Frame, launches: Array, answers: Ans
 
 
 def _equilibrium_near(formulas: "Formulas", p: "ParameterValues", lam0: float) -> Equilibrium:
-    """Return the equilibrium next to a launch place."""
+    """Return the equilibrium next to a launch place, on both sides of which the force has opposite signs."""
     launch = read_launch(formulas, p, LaunchRequest(lam0))
     problem = Problem(formulas, launch, p, formulas.domain(p), bind_all(formulas, p))
-    loss, around = problem.functions.dissipation, SMALL_SHARE * abs(lam0)
+    loss, around = problem.functions.dissipation, _surroundings(formulas, p, np.array([lam0]))[0]
     assert loss is not None
-    ends = np.clip([lam0 - around, lam0 + around], problem.low, problem.high)
-    behind, ahead = force_at_rest(loss, problem.functions.p, ends, 1, 1)
-    if not behind > 0.0 > ahead:
-        return Equilibrium(lam0, None)
+    ends = np.array([lam0 - around, lam0 + around])
+    behind, ahead = np.sign(force_at_rest(loss, problem.functions.p, ends, 1, 1))
     for _ in range(HALVINGS):
-        middle = 0.5 * (ends[0] + ends[1])
-        ends[0 if force_at_rest(loss, problem.functions.p, np.array([middle]), 1, 1)[0] > 0.0 else 1] = middle
+        middle = np.array([0.5 * (ends[0] + ends[1])])
+        ends[0 if behind * force_at_rest(loss, problem.functions.p, middle, 1, 1)[0] > 0.0 else 1] = middle[0]
+    if not behind > 0.0 > ahead:
+        return Equilibrium(float(ends[0]), None)
     line = conditions_of(problem).lines[0].copy()
     line[FIRST_STEP], place, frame = starting_step(problem), float(ends[0]), None
     for _ in range(2):  # the second time from the place that double-double arithmetic gives
@@ -160,6 +160,16 @@ def _equilibrium_near(formulas: "Formulas", p: "ParameterValues", lam0: float) -
         frame = entry.frame
         place = float(frame.p[PLACE_OF_FRAME])
     return Equilibrium(place, frame)
+
+
+def _surroundings(formulas: "Formulas", p: "ParameterValues", places: Array) -> Array:
+    """Return the distances from launch places within which compiled code looks for equilibria (`may_be_small`)."""
+    f, domain = bind_all(formulas, p), formulas.domain(p)
+    reach = np.full(places.size, first_step.py_func(domain.numbers))
+    for end in (domain.low, domain.high, *f.corners):
+        reach = np.minimum(reach, np.abs(end - places))
+    around: Array = np.minimum(SMALL_SHARE * np.abs(places), RANGE_SHARE * reach)
+    return around
 
 
 def _distances(frame: Frame, places: Array) -> tuple[Array, Array]:
