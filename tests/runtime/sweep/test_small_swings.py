@@ -69,3 +69,16 @@ def test_they_are_those_of_solved_motions(curve: Any, place: float | None, width
             motion = module.solve(*launch, c=0.1, t_max=given["t_max"])
             true = motion.time_at(target) if quantity == "time_at" else getattr(motion, quantity).value
             assert found.values[k] == pytest.approx(true, rel=6e-15), quantity
+
+
+def test_wells_side_by_side(tmp_path: Path) -> None:
+    """In many wells far from the origin, answers do not depend on the order of the launches."""
+    graph = gqm.Curve.graph("sin(x) + x/50", parameter="x")
+    module = gqm.build(gqm.derive(graph, gqm.Gravity() + gqm.LinearDrag()), name="wells", folder=tmp_path)
+    wells = 2.0 * np.pi * np.array([1, 9, 40]) - np.pi / 2.0
+    lam0 = (wells[:, None] + np.array([-1.4, -0.1, 0.02, 0.7])).ravel()
+    order = np.random.default_rng(1).permutation(lam0.size)
+    found = module.sweep("v_max", lam0, c=0.1, t_max=2).values
+    assert (module.sweep("v_max", lam0[order], c=0.1, t_max=2).values == found[order]).all()
+    true = [module.solve(place, c=0.1, t_max=2).v_max.value for place in lam0.tolist()]
+    assert found == pytest.approx(true, rel=4e-15)
