@@ -318,7 +318,8 @@ def test_four_processes_at_once(tmp_path: Path) -> None:
     source, path = tmp_path / "text", tmp_path / "out" / "small.py"
     source.write_text(SMALL, encoding="utf-8")
     done = python(WRITE_AND_COMPILE, source, path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
-    assert (done.returncode, done.stdout) == (0, b"compiled\n" * 4), done.stderr
+    # What several processes write to one pipe may be mixed: a line may come before the end of another.
+    assert (done.returncode, done.stdout.replace(b"\n", b"")) == (0, b"compiled" * 4), done.stderr
     assert names_in(path.parent) == ["small.py"]
     assert [entry.suffix for entry in (tmp_path / "cache").rglob("*") if entry.is_file()] == [".nbc"]
     assert path.read_text(encoding="utf-8") == SMALL
