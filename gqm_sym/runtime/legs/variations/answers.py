@@ -315,9 +315,9 @@ def extreme(motion: Any, quantity: str) -> Array:
     at the jump.
     """
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
-    changes = motion._changes_at(motion._march_points(found.t)[0])
     if of_speed and found.value == 0.0:
-        return np.zeros(changes.variables)
+        return np.zeros(len(motion.problem.p) + 2)
+    changes = motion._changes_at(motion._march_points(found.t)[0])
     t_end, moved = _searched_until(motion), np.zeros((changes.variables, 1))
     at_end, at_break = abs(t_end - found.t) <= AT_END * t_end, _is_at_break(changes, found.lam)
     if at_end and not (at_break and motion.legs[-1].end == "liftoff"):
