@@ -38,7 +38,7 @@ from gqm_sym.runtime.legs.body import (
     TOTAL,
     VALUE,
 )
-from gqm_sym.runtime.legs.frames.local_frame import may_be_small
+from gqm_sym.runtime.legs.frames.local_frame import distance_of_search, may_be_small
 from gqm_sym.runtime.legs.frames.tiny_legs import is_tiny, slides_little
 from gqm_sym.runtime.legs.gaps.data import forget
 from gqm_sym.runtime.legs.gaps.rooms import room_for
@@ -283,7 +283,7 @@ def drive(dissipation, parameters, row, joints, question, bodies, records):  # t
         elif not fits(dissipation, p, body):
             body[VALUE], body[STATUS] = np.nan, LEFT
         elif is_near(dissipation, p, joints, question, body):
-            body[VALUE], body[STATUS] = np.nan, NEAR
+            body[VALUE], body[STATUS] = distance_of_search(joints.corners, body), NEAR
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, records[0])
         else:

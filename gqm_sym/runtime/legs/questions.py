@@ -52,7 +52,8 @@ LEAST_LENGTH, MOST_LENGTH = 10, 11
 
 # The status of an answer; LEFT is that of a body that the loop does not decide, and TOO_LONG that of one whose motion
 # has more turns than are followed. NEAR is that of a body whose swing is small beside its place, so that its speed and
-# its times would have few digits; it is to be driven by its distance from the equilibrium (`frames`).
+# its times would have few digits; it is to be driven by its distance from the equilibrium (`frames`). Its value is the
+# distance within which that lies.
 FOUND, LEFT, NONE, TOO_LONG, NEAR = range(5)
 
 # On a curve without ends, the number of successive runs without a turn after which the search for an end stops.

@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 # that are driven at a time; and the number from which on a thread is worth starting.
 MAX_PANELS, CHUNK, MIN_BODIES_PER_THREAD = 128, 2**12, 2**5
 
+# The width of a leg at which driving a body by its distance from an equilibrium counts as tried (`RETRY_WIDTH`).
+TRIED = LEAST_SWING
+
 # The quantities of motions that repeat, and the time in s up to which others are followed to know that they do not.
 PERIODIC, BEGINNING = ("half_period", "period", "turning_points"), 1e-300
 
@@ -156,50 +159,39 @@ def _answer_lines(
     launches: list[Any] = [some[LAM0], *domain, *asks, some[V0] * some[V0]]  # in the order of `legs.body`
     for k, column in enumerate(launches):
         bodies[:, k] = column
-    bodies[:, RETRY_WIDTH] = LEAST_SWING if by_places else 0.0
-    mass = some[PARAMETERS + list(formulas.parameters).index("m")]
-    drive_bodies(asked, dissipation, track, _rows(some[PARAMETERS:], track.chart), bodies, mass, chosen, found)
+    bodies[:, RETRY_WIDTH] = TRIED if by_places else 0.0
+    drive_bodies(asked, dissipation, track, _rows(some[PARAMETERS:], track.chart), bodies)
+    if asked.question >= questions.LEAST_LOAD and not dissipation.path_in_space:
+        bodies[:, VALUE] *= some[PARAMETERS + list(formulas.parameters).index("m")]
+    enter_answers(asked, bodies, found, chosen)
 
 
-def drive_bodies(
-    asked: Question,
-    dissipation: Dissipation,
-    track: Track,
-    rows: Array,
-    bodies: Array,
-    mass: Array,
-    chosen: NDArray[np.intp] | None,
-    found: Answers,
-) -> None:
-    """Drive bodies, and fill their answers as far as they are decided.
+def drive_bodies(asked: Question, dissipation: Dissipation, track: Track, rows: Array, bodies: Array) -> None:
+    """Drive bodies from their launch (`legs.body`); the rows are the parameters of each body, or of all."""
+    record = np.empty((1, (MAX_PANELS + track.breaks.size) * COLUMNS))
+    drive_along(track, dissipation, rows, asked.question, bodies, record)
+
+
+def enter_answers(asked: Question, bodies: Array, found: Answers, chosen: NDArray[np.intp] | None = None) -> None:
+    """Fill the answers of bodies that have been driven, as far as they are decided.
 
     Parameters
     ----------
-    dissipation : Dissipation
-        The forces.
-    rows : array
-        The parameters of each body, or of all.
     bodies : array
-        The bodies at their launch (`legs.body`).
-    mass : array
-        The mass of each, or of all.
-    chosen : array of int, optional
-        The numbers of their answers.
+        The bodies (`legs.body`).
     found : Answers
         Filled in.
+    chosen : array of int, optional
+        The numbers of the answers, if these are not those of all.
     """
-    record = np.empty((1, (MAX_PANELS + track.breaks.size) * COLUMNS))
-    drive_along(track, dissipation, rows, asked.question, bodies, record)
     values, ended = bodies[:, VALUE], bodies[:, STATUS]
-    if asked.question >= questions.LEAST_LOAD and not dissipation.path_in_space:
-        values *= mass
     status = np.full(ended.size, quantities.ANSWERED, dtype=np.int8)
     without = ended != questions.FOUND
     if without.any():
         none = quantities.NEVER_THERE if asked.question == questions.ARRIVAL else quantities.NOT_PERIODIC
-        values[without], status[without] = nan, none
-        status[ended == questions.TOO_LONG] = quantities.REFUSED
-        status[ended == questions.NEAR] = quantities.NEAR_EQUILIBRIUM
+        near = ended == questions.NEAR
+        values[without & ~near], status[without] = nan, none
+        status[ended == questions.TOO_LONG], status[near] = quantities.REFUSED, quantities.NEAR_EQUILIBRIUM
         decided = ended != questions.LEFT
         values, status = values[decided], status[decided]
         chosen = np.flatnonzero(decided) if chosen is None else chosen[decided]

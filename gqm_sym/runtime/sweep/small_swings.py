@@ -16,19 +16,27 @@ from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.strided import DIRECTION, LAM0, TARGET, V0, lay_out
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.ends import first_step, starting_step
+from gqm_sym.runtime.launch.ends import starting_step
 from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.legs.answers import Track
-from gqm_sym.runtime.legs.body import FIRST_STEP, LEAST_SWING, PLACE, PLACE_LOW, RETRY_WIDTH, launched
+from gqm_sym.runtime.legs.body import FIRST_STEP, PLACE, PLACE_LOW, RETRY_WIDTH, launched
 from gqm_sym.runtime.legs.conditions import SMOOTH, conditions_of
 from gqm_sym.runtime.legs.driver import SWINGS_AHEAD
 from gqm_sym.runtime.legs.frames.entering import Entry, entry_near
 from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_OF_FRAME
 from gqm_sym.runtime.legs.frames.local_frame import PLACE_LOW as LOW_OF_FRAME
-from gqm_sym.runtime.legs.frames.local_frame import RANGE_SHARE, SMALL_SHARE, Frame, force_at_rest
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, force_at_rest
 from gqm_sym.runtime.sweep import quantities
-from gqm_sym.runtime.sweep.dissipative_loop import CHUNK, MIN_BODIES_PER_THREAD, Question, answer_driven, drive_bodies
+from gqm_sym.runtime.sweep.dissipative_loop import (
+    CHUNK,
+    MIN_BODIES_PER_THREAD,
+    TRIED,
+    Question,
+    answer_driven,
+    drive_bodies,
+    enter_answers,
+)
 from gqm_sym.runtime.sweep.quantities import Answers
 
 if TYPE_CHECKING:
@@ -58,20 +66,20 @@ class Equilibrium(NamedTuple):
 
 def answer_small_swings(
     formulas: "Formulas",
-    p: "ParameterValues | None",
+    p: "ParameterValues",
     asked: Question,
     track: Track,
     columns: list[Array],
     answers: Answers,
 ) -> None:
-    """Fill the answers of launches with the status NEAR_EQUILIBRIUM, as far as compiled code decides them.
+    """Fill the answers of launches with the status NEAR_EQUILIBRIUM, as far as compiled code decides them; their values
+    are the distances within which compiled code has seen that the force changes its sign.
 
     Parameters
     ----------
     formulas : Formulas
-    p : ParameterValues, optional
-        The run-time parameters. If launches differ in them, and so in their equilibria, they are not given, and bodies
-        are driven by their places.
+    p : ParameterValues
+        The run-time parameters of all launches.
     asked : Question
     track : Track
         The curve.
@@ -81,17 +89,17 @@ def answer_small_swings(
         Filled in.
     """
     left, by_places = np.flatnonzero(answers.status == quantities.NEAR_EQUILIBRIUM), list[NDArray[np.intp]]()
-    size = answers.status.size
+    size, around = answers.status.size, answers.values[:, 0].copy()
     lines = lay_out(columns, 0, size)
     lam0, v0, direction, target = (np.broadcast_to(lines[k], size) for k in (LAM0, V0, DIRECTION, TARGET))
-    known: list[Equilibrium] = [] if p is None else p.conditions.setdefault("equilibria", [])
+    known: list[Equilibrium] = p.conditions.setdefault("equilibria", [])
     number = 0
-    while p is not None and left.size and number < MAX_EQUILIBRIA:
+    while left.size and number < MAX_EQUILIBRIA:
         if number == len(known):
-            known.append(_equilibrium_near(formulas, p, float(lam0[left[0]])))
+            known.append(_equilibrium_near(formulas, p, float(lam0[left[0]]), float(around[left[0]])))
         place, frame = known[number]
         number += 1
-        near = np.abs(lam0[left] - place) <= _surroundings(formulas, p, lam0[left])
+        near = np.abs(lam0[left] - place) <= around[left]
         some, left = left[near], left[~near]
         if frame is None:
             by_places.append(some)
@@ -132,16 +140,18 @@ def _drive_in_frame(asked: Question, frame: Frame, launches: Array, answers: Ans
         asks = direction, asked.only_sign, asked.horizon, ahead, v0**2
         for k, column in enumerate((distance, *ends, *asks)):  # in the order of `legs.body`
             bodies[:, k] = column
-        bodies[:, PLACE_LOW], bodies[:, RETRY_WIDTH] = low, LEAST_SWING
-        track, p = SMOOTH._replace(breaks=frame.breaks), frame.p[None]
-        drive_bodies(asked, frame.dissipation, track, p, bodies, np.ones(1), None, answers.part(chunk))
+        bodies[:, PLACE_LOW], bodies[:, RETRY_WIDTH] = low, TRIED
+        drive_bodies(asked, frame.dissipation, SMOOTH._replace(breaks=frame.breaks), frame.p[None], bodies)
+        enter_answers(asked, bodies, answers.part(chunk))
 
 
-def _equilibrium_near(formulas: "Formulas", p: "ParameterValues", lam0: float) -> Equilibrium:
-    """Return the equilibrium next to a launch place, on both sides of which the force has opposite signs."""
+def _equilibrium_near(formulas: "Formulas", p: "ParameterValues", lam0: float, around: float) -> Equilibrium:
+    """Return the equilibrium next to a launch place, at a distance ``around`` from which the force has opposite signs
+    on both sides.
+    """
     launch = read_launch(formulas, p, LaunchRequest(lam0))
     problem = Problem(formulas, launch, p, formulas.domain(p), bind_all(formulas, p))
-    loss, around = problem.functions.dissipation, _surroundings(formulas, p, np.array([lam0]))[0]
+    loss = problem.functions.dissipation
     assert loss is not None
     ends = np.array([lam0 - around, lam0 + around])
     behind, ahead = np.sign(force_at_rest(loss, problem.functions.p, ends, 1, 1))
@@ -160,16 +170,6 @@ def _equilibrium_near(formulas: "Formulas", p: "ParameterValues", lam0: float) -
         frame = entry.frame
         place = float(frame.p[PLACE_OF_FRAME])
     return Equilibrium(place, frame)
-
-
-def _surroundings(formulas: "Formulas", p: "ParameterValues", places: Array) -> Array:
-    """Return the distances from launch places within which compiled code looks for equilibria (`may_be_small`)."""
-    f, domain = bind_all(formulas, p), formulas.domain(p)
-    reach = np.full(places.size, first_step.py_func(domain.numbers))
-    for end in (domain.low, domain.high, *f.corners):
-        reach = np.minimum(reach, np.abs(end - places))
-    around: Array = np.minimum(SMALL_SHARE * np.abs(places), RANGE_SHARE * reach)
-    return around
 
 
 def _distances(frame: Frame, places: Array) -> tuple[Array, Array]:

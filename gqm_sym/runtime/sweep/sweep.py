@@ -139,15 +139,16 @@ def sweep_with_columns(
             some = answers if chosen is None else answers.part(chosen)
             if asked is not None:
                 track = Track(group.chart, group.joints, group.corners, group.liftoff_corners, not varies)
-                work, least = partial(answer_driven, formulas, asked, track, group.columns, some), MIN_BODIES_PER_THREAD
+                # If launches differ in run-time parameters, they have no equilibria in common.
+                work = partial(answer_driven, formulas, asked, track, group.columns, some, by_places=varies)
+                least = MIN_BODIES_PER_THREAD
             else:
                 last = inf if t_max is None else as_doubles(t_max, "t_max").item()
                 ask = Question(found.code, ONLY_SIGN[contact], last, _rounded_off(formulas, parameters))
                 work, least = partial(_answer, formulas, ask, group, some), MIN_LAUNCHES_PER_THREAD
             run_in_threads(work, some.status.size, least)
             if asked is not None and (some.status == quantities.NEAR_EQUILIBRIUM).any():
-                p = None if varies else formulas.numbers(parameters)
-                answer_small_swings(formulas, p, asked, track, group.columns, some)
+                answer_small_swings(formulas, formulas.numbers(parameters), asked, track, group.columns, some)
             if asked is None and group.corners.size:
                 some.status[np.broadcast_to(rests_on_corner(group), some.status.size)] = quantities.UNDECIDED
                 if formulas.rolling_radius:  # as `rolling.check_launch` does

@@ -172,18 +172,24 @@ def sense_of(dissipation, p, body):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def distance_of_search(corners, body):  # type: ignore[no-untyped-def]
+    """Return the distance from a body within which an equilibrium is looked for."""
+    place = body[BODY_PLACE]
+    reach = min(body[FIRST_STEP], fabs(body[LOW] - place), fabs(body[HIGH] - place))
+    for known in corners:
+        reach = min(reach, fabs(known - place))
+    return min(SMALL_SHARE * max(fabs(place), body[LEAST_SIZE]), RANGE_SHARE * reach)
+
+
+@Inner
 def may_be_small(dissipation, p, corners, body):  # type: ignore[no-untyped-def]
     """Return whether `fitting.frame_near` may find a frame for a body, because the force on it at rest changes its sign
     nearby.
     """
-    place, reach, point = body[BODY_PLACE], body[FIRST_STEP], point_buffer()
-    size = max(fabs(place), body[LEAST_SIZE])
-    if dissipation.kinked or size == 0.0:
+    place, point = body[BODY_PLACE], point_buffer()
+    if dissipation.kinked or max(fabs(place), body[LEAST_SIZE]) == 0.0:
         return False
-    reach = min(reach, fabs(body[LOW] - place), fabs(body[HIGH] - place))
-    for known in corners:
-        reach = min(reach, fabs(known - place))
-    around = min(SMALL_SHARE * size, RANGE_SHARE * reach)
+    around = distance_of_search(corners, body)
     direction, contact_sign = sense_of(dissipation, p, body)
     forces = forces_on(dissipation, p, direction)
     behind = slope_of_v2(forces, place - around, LEAST_V2, contact_sign, point)
